@@ -1,0 +1,63 @@
+// The measurement function of one observation within a pair of frames: lens, shutter clock and
+// rates composed (design.md section 2), with the derivative by the pixel, so that pixel noise is
+// propagated through all of it, and with back-propagation of any scalar to every parameter.
+#ifndef CAMGYRO_CORE_PAIR_MODEL_H_
+#define CAMGYRO_CORE_PAIR_MODEL_H_
+
+#include <Eigen/Core>
+
+#include "core/lens.h"
+#include "core/rotation_chain.h"
+
+namespace camgyro {
+
+// The shutter clock's parameter block: [ t_d [s], t_r [s] ].
+enum ShutterIndex : int { kDelay, kReadout, kShutterSize };
+using ShutterParameters = Eigen::Matrix<double, kShutterSize, 1>;
+
+// Time on the gyro clock at which row v_px is exposed, eq. (2):
+//   t_gyro = t_frame + t_d + t_r * v / h
+// frame_time_s: the frame's recorded stamp, seconds from the same origin as the gyro's times.
+inline double RowTimeGyroS(double frame_time_s, const ShutterParameters& shutter, double v_px,
+                           double height_px) {
+  return frame_time_s + shutter[kDelay] + shutter[kReadout] * v_px / height_px;
+}
+
+// A pixel seen from the reference orientation of its pair (the gyro frame at the first rate).
+struct Bearing {
+  Eigen::Vector3d ray_ref;               // R_ref_gyro(t) R_gyro_cam ray_cam
+  Eigen::Matrix<double, 3, 2> J_ray_px;  // through the lens and through the row's time
+
+  // What Backpropagate needs.
+  RayJet lens_ray;
+  RotationChain::State rotation;
+  Eigen::Matrix3d R_ref_cam;
+  Eigen::Vector3d omega_cam_rad_s;
+  double line_delay_s = 0.0;
+  double row_fraction = 0.0;  // v / h
+};
+
+// Derivatives of one scalar by the parameters of a pair; rates are added by the caller's chain.
+struct PairGradient {
+  Eigen::Matrix<double, 1, kLensSize> by_lens = Eigen::Matrix<double, 1, kLensSize>::Zero();
+  Eigen::Matrix<double, 1, kShutterSize> by_shutter =
+      Eigen::Matrix<double, 1, kShutterSize>::Zero();
+  Eigen::RowVector3d by_rotation = Eigen::RowVector3d::Zero();  // right perturbation of q_gyro_cam
+};
+
+// False where the lens has no ray for this pixel.
+[[nodiscard]] bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
+                                   const ShutterParameters& shutter,
+                                   const Eigen::Matrix3d& R_gyro_cam, const RotationChain& chain,
+                                   double frame_time_s, double height_px, const Eigen::Vector2d& px,
+                                   Bearing* bearing);
+
+// Adds to `gradient` and `by_rates` (3 x chain.size()) the derivative of a scalar, given its
+// derivatives by ray_ref and by J_ray_px of one bearing.
+void Backpropagate(const Bearing& bearing, const RotationChain& chain, double height_px,
+                   const Eigen::Vector3d& by_ray, const Eigen::Matrix<double, 3, 2>& by_J_ray_px,
+                   PairGradient* gradient, Eigen::Ref<Eigen::Matrix3Xd> by_rates);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_CORE_PAIR_MODEL_H_

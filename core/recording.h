@@ -1,0 +1,122 @@
+// A recording: what a reader found in the files, before any estimation.
+#ifndef CAMGYRO_CORE_RECORDING_H_
+#define CAMGYRO_CORE_RECORDING_H_
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/lens.h"
+#include "core/result.h"
+
+namespace camgyro {
+
+// Angular rate in the gyro frame [rad/s], bias included; stamp on the gyro clock.
+struct GyroSample {
+  int64_t stamp_ns = 0;
+  Eigen::Vector3d omega_gyro_rad_s = Eigen::Vector3d::Zero();
+};
+
+// Specific force in the gyro (IMU) frame [m/s^2]; stamp on the gyro clock.
+struct AccelSample {
+  int64_t stamp_ns = 0;
+  Eigen::Vector3d accel_gyro_m_s2 = Eigen::Vector3d::Zero();
+};
+
+struct Frame {
+  int64_t stamp_ns = 0;                                          // camera clock
+  double exposure_s = std::numeric_limits<double>::quiet_NaN();  // NaN: not recorded
+  std::string image_file;                                        // path; empty without images
+};
+
+struct TrackedPoint {
+  int64_t track_id = 0;
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  // pixel (0,0) is the centre of the top-left pixel
+};
+
+struct Match {
+  Eigen::Vector2d px_a = Eigen::Vector2d::Zero();
+  Eigen::Vector2d px_b = Eigen::Vector2d::Zero();
+};
+
+// Matched features of two frames (indices into Recording::frames, frame_a < frame_b).
+struct FramePair {
+  int frame_a = 0;
+  int frame_b = 0;
+  std::vector<Match> matches;
+};
+
+// Rotation of the camera between two frames, found from their pictures or attitudes alone.
+struct CameraRotation {
+  int frame_a = 0, frame_b = 0;                               // indices into Recording::frames
+  Eigen::Quaterniond q_a_b = Eigen::Quaterniond::Identity();  // vectors of camera b into camera a
+  double sigma_rad = 0.0;  // per axis, as far as the maker knows it
+};
+
+// Where the pixel noise of a match sits (D 5, "shared observations").
+enum class MatchNoise {
+  kBothImages,   // each observation has its own independent error
+  kSecondImage,  // tracker re-anchored at every frame: the first image is the definition
+};
+
+// What the files declare about the camera, as an initial guess. Absent: to be found.
+struct CameraGuess {
+  int width_px = 0;
+  int height_px = 0;
+  std::optional<double> focal_px;  // of the rows, fv
+  double aspect_ratio = 1.0;       // fu / fv
+  std::optional<Eigen::Vector2d> principal_px;
+  DistortionModel distortion_model = DistortionModel::kNone;
+  std::vector<double> distortion;  // in the order of the model (lens.h)
+  std::optional<Eigen::Quaterniond> q_gyro_cam;
+  std::optional<double> readout_s;
+  std::optional<double> delay_s;
+};
+
+// What the files declare about the gyro.
+struct GyroInfo {
+  std::optional<double> noise_density_rad_s_rtHz;  // white noise, continuous
+  std::optional<double> random_walk_rad_s2_rtHz;   // of the bias
+};
+
+struct Recording {
+  std::string path;  // as the user gave it
+  CameraGuess camera;
+  GyroInfo gyro_info;
+
+  std::vector<Frame> frames;       // stamps strictly increasing
+  std::vector<GyroSample> gyro;    // stamps strictly increasing
+  std::vector<AccelSample> accel;  // empty, or stamps strictly increasing
+
+  // Image motion, in the order of preference; what is empty is absent.
+  std::vector<FramePair> matches;                 // pairwise matches without identity
+  std::vector<std::vector<TrackedPoint>> tracks;  // one entry per frame, by ascending track id
+  std::vector<Eigen::Quaterniond> q_cam_world;    // one per frame, world -> camera
+  std::string video_file;                         // frames of a container, in frames' order
+
+  MatchNoise match_noise = MatchNoise::kBothImages;
+  // Set if a file says that the picture was stabilised electronically, with the file's own words.
+  std::optional<std::string> declared_stabilisation;
+  // What the reader saw and a user should know (unit converted, samples dropped, clock rebuilt).
+  std::vector<std::string> notes;
+
+  bool HasImages() const {
+    return !video_file.empty() || (!frames.empty() && !frames.front().image_file.empty());
+  }
+};
+
+// Matches between frames i and i + gap from tracks: every track seen in both.
+std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,
+                                       int gap);
+
+// Median interval of strictly increasing stamps [s]; 0 with fewer than two.
+double MedianInterval(const std::vector<GyroSample>& gyro);
+double MedianInterval(const std::vector<Frame>& frames);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_CORE_RECORDING_H_

@@ -1,0 +1,75 @@
+#include "core/rotation_chain.h"
+
+#include <algorithm>
+
+#include "core/so3.h"
+
+namespace camgyro {
+
+RotationChain::RotationChain(const std::vector<double>& times_s,
+                             const Eigen::Matrix3Xd& omega_gyro_rad_s)
+    : times_s_(times_s), omega_(omega_gyro_rad_s) {
+  const size_t n = times_s_.size();
+  prefix_.resize(n);
+  segment_.resize(n);
+  prefix_[0].setIdentity();
+  for (size_t j = 0; j + 1 < n; ++j) {
+    const double dt = times_s_[j + 1] - times_s_[j];
+    const auto col = static_cast<Eigen::Index>(j);
+    const Eigen::Vector3d theta = 0.5 * dt * (omega_.col(col) + omega_.col(col + 1));
+    segment_[j] = (0.5 * dt) * prefix_[j] * LeftJacobian(theta);
+    prefix_[j + 1] = prefix_[j] * Exp(theta).toRotationMatrix();
+  }
+}
+
+RotationChain::State RotationChain::At(double time_s) const {
+  State state;
+  const int last = size() - 1;
+  const auto upper = std::upper_bound(times_s_.begin(), times_s_.end(), time_s);
+  int j = static_cast<int>(upper - times_s_.begin()) - 1;
+  Eigen::Vector3d theta;
+  if (j < 0 || j >= last) {  // held rate outside the samples
+    const int held = j < 0 ? 0 : last;
+    state.segment = j < 0 ? 0 : last - 1;
+    state.weight_next = j < 0 ? 0.0 : 1.0;
+    state.alpha_gyro_rad_s2.setZero();
+    const double duration = time_s - times_s_[static_cast<size_t>(held)];
+    (j < 0 ? state.theta_this_s : state.theta_next_s) = duration;
+    state.omega_gyro_rad_s = omega_.col(held);
+    theta = duration * state.omega_gyro_rad_s;
+    j = held;
+  } else {
+    const double t0 = times_s_[static_cast<size_t>(j)];
+    const double dt = times_s_[static_cast<size_t>(j) + 1] - t0;
+    const double elapsed = time_s - t0;
+    state.segment = j;
+    state.weight_next = elapsed / dt;
+    state.theta_next_s = 0.5 * elapsed * state.weight_next;
+    state.theta_this_s = elapsed - state.theta_next_s;
+    state.alpha_gyro_rad_s2 = (omega_.col(j + 1) - omega_.col(j)) / dt;
+    state.omega_gyro_rad_s = omega_.col(j) + elapsed * state.alpha_gyro_rad_s2;
+    theta = state.theta_this_s * omega_.col(j) + state.theta_next_s * omega_.col(j + 1);
+  }
+  const Eigen::Matrix3d& start = prefix_[static_cast<size_t>(j)];
+  state.J_phi_theta = start * LeftJacobian(theta);
+  state.R_ref_gyro = start * Exp(theta).toRotationMatrix();
+  return state;
+}
+
+void RotationChain::AddRateGradient(const State& state, const Eigen::Vector3d& by_phi,
+                                    const Eigen::Vector3d& by_omega,
+                                    Eigen::Ref<Eigen::Matrix3Xd> gradient) const {
+  const int m = state.segment;
+  // Whole segments before the one of `state`; past the last sample, the last one is whole too.
+  const int whole = (state.weight_next == 1.0 && state.theta_this_s == 0.0) ? m + 1 : m;
+  for (int j = 0; j < whole; ++j) {
+    const Eigen::Vector3d part = segment_[static_cast<size_t>(j)].transpose() * by_phi;
+    gradient.col(j) += part;
+    gradient.col(j + 1) += part;
+  }
+  const Eigen::Vector3d by_theta = state.J_phi_theta.transpose() * by_phi;
+  gradient.col(m) += state.theta_this_s * by_theta + (1.0 - state.weight_next) * by_omega;
+  gradient.col(m + 1) += state.theta_next_s * by_theta + state.weight_next * by_omega;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,54 @@
+// Rotations of the gyro from its rates: ordered products, eq. (5)-(6) of Jia & Evans, with prefix
+// products, so that one look-up costs the same however many rates lie before it.
+#ifndef CAMGYRO_CORE_ROTATION_CHAIN_H_
+#define CAMGYRO_CORE_ROTATION_CHAIN_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace camgyro {
+
+// R_ref_gyro(t): maps vectors of the gyro frame at t into the gyro frame at the first sample.
+//
+// Between two samples the rate is linear in time (the paper holds it constant, which delays the
+// gyro by half a sampling interval); its integral theta(t) over a segment gives Exp(theta). What
+// this neglects, the commutator of the two rates, is dt^2/12 |w0 x w1| <= 1e-5 rad per segment at
+// 100 Hz and 10 rad/s^2. Before the first and after the last sample the rate is held.
+class RotationChain {
+ public:
+  // What an observation at one time needs, and what its derivatives need.
+  struct State {
+    Eigen::Matrix3d R_ref_gyro;
+    Eigen::Vector3d omega_gyro_rad_s;
+    Eigen::Vector3d alpha_gyro_rad_s2;  // slope of the rate
+    int segment = 0;                    // rates `segment` and `segment + 1` are interpolated
+    double weight_next = 0.0;           // omega = (1 - w) omega[segment] + w omega[segment + 1]
+    double theta_this_s = 0.0, theta_next_s = 0.0;  // theta = sum of these times the two rates
+    Eigen::Matrix3d J_phi_theta;  // left perturbation of R_ref_gyro by the partial theta
+  };
+
+  // times_s: strictly increasing, at least two. Rates [rad/s] as columns.
+  RotationChain(const std::vector<double>& times_s, const Eigen::Matrix3Xd& omega_gyro_rad_s);
+
+  int size() const { return static_cast<int>(times_s_.size()); }
+  const std::vector<double>& times_s() const { return times_s_; }
+
+  State At(double time_s) const;
+
+  // Adds to `gradient` (3 x size) the derivative of a scalar by every rate, given its derivatives
+  // by the left perturbation phi of R_ref_gyro and by the rate at that time. Columns after
+  // state.segment + 1 stay untouched.
+  void AddRateGradient(const State& state, const Eigen::Vector3d& by_phi,
+                       const Eigen::Vector3d& by_omega,
+                       Eigen::Ref<Eigen::Matrix3Xd> gradient) const;
+
+ private:
+  std::vector<double> times_s_;
+  Eigen::Matrix3Xd omega_;
+  std::vector<Eigen::Matrix3d> prefix_;   // R_ref_gyro at each sample
+  std::vector<Eigen::Matrix3d> segment_;  // prefix * J_l(theta) * dt / 2 of each whole segment
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_CORE_ROTATION_CHAIN_H_
