@@ -23,7 +23,7 @@ function(camgyro_library name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "SOURCES;PUBLIC;PRIVATE")
   add_library(camgyro_${name} STATIC ${ARG_SOURCES})
   add_library(camgyro::${name} ALIAS camgyro_${name})
-  set_target_properties(camgyro_${name} PROPERTIES EXPORT_NAME ${name}
+  set_target_properties(camgyro_${name} PROPERTIES EXPORT_NAME ${name} LINKER_LANGUAGE CXX
                                                    POSITION_INDEPENDENT_CODE ON)
   target_compile_features(camgyro_${name} PUBLIC cxx_std_17)
   target_include_directories(camgyro_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>

@@ -54,7 +54,7 @@ void Backpropagate(const Bearing& b, const RotationChain& chain, double height_p
 
   // Time of exposure, then delay and readout; the readout also scales the row-time part of J.
   const double by_time =
-      by_phi.dot(b.R_ref_cam * omega) + by_omega.dot(b.rotation.alpha_gyro_rad_s2);
+      by_phi.dot(b.rotation.PhiPerSecond()) + by_omega.dot(b.rotation.alpha_gyro_rad_s2);
   gradient->by_shutter[kDelay] += by_time;
   gradient->by_shutter[kReadout] +=
       by_time * b.row_fraction + by_J1.dot(omega.cross(ray)) / height_px;

@@ -25,6 +25,9 @@ class RotationChain {
     double weight_next = 0.0;           // omega = (1 - w) omega[segment] + w omega[segment + 1]
     double theta_this_s = 0.0, theta_next_s = 0.0;  // theta = sum of these times the two rates
     Eigen::Matrix3d J_phi_theta;  // left perturbation of R_ref_gyro by the partial theta
+
+    // Left perturbation of R_ref_gyro per second: R_ref_gyro * omega, up to the commutator.
+    Eigen::Vector3d PhiPerSecond() const { return J_phi_theta * omega_gyro_rad_s; }
   };
 
   // times_s: strictly increasing, at least two. Rates [rad/s] as columns.

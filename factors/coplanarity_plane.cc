@@ -1,0 +1,79 @@
+#include "factors/coplanarity_plane.h"
+
+#include <glog/logging.h>
+
+#include <utility>
+
+#include "factors/robust.h"
+
+namespace camgyro {
+
+PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matrix<double, 3, 2>& A,
+                                    const Eigen::Vector3d& b, const Eigen::Matrix<double, 3, 2>& B,
+                                    const Eigen::Vector3d& tau, double variance_a,
+                                    double variance_b) {
+  // The numerator e = tau . (a x b) is linear in each ray: e = a . m_a = b . m_b.
+  const Eigen::Vector3d m_a = b.cross(tau), m_b = tau.cross(a), n = a.cross(b);
+  const double e = tau.dot(n);
+  const Eigen::Vector2d e_px_a = A.transpose() * m_a, e_px_b = B.transpose() * m_b;
+  // A match on the epipole in both images says nothing; the floor keeps it at zero residual.
+  const double variance =
+      variance_a * e_px_a.squaredNorm() + variance_b * e_px_b.squaredNorm() + 1e-30;
+  const double inv_sigma = 1.0 / std::sqrt(variance);
+
+  PlaneResidual r;
+  r.value = e * inv_sigma;
+  // dr = de / sigma - (e / sigma^3) d(sigma^2 / 2)
+  const double k = r.value * inv_sigma * inv_sigma;
+  const Eigen::Vector3d q_a = variance_a * (A * e_px_a), q_b = variance_b * (B * e_px_b);
+  r.by_a = inv_sigma * m_a - k * q_b.cross(tau);
+  r.by_b = inv_sigma * m_b - k * tau.cross(q_a);
+  r.by_tau = inv_sigma * n - k * (q_a.cross(b) + a.cross(q_b));
+  r.by_J_a = (-k * variance_a) * m_a * e_px_a.transpose();
+  r.by_J_b = (-k * variance_b) * m_b * e_px_b.transpose();
+  return r;
+}
+
+CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
+    : pair_(std::move(pair)) {
+  CHECK_GT(pair_->sigma_px, 0.0);
+  CHECK_GE(pair_->rate_times_s.size(), 2u);
+  set_num_residuals(static_cast<int>(pair_->matches.size()));
+  *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3};
+  for (const int size : pair_->rate_group_sizes) {
+    mutable_parameter_block_sizes()->push_back(3 * size);
+  }
+}
+
+bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residuals,
+                                double** jacobians) const {
+  const PairMeasurement& pair = *pair_;
+  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + kFirstRateGroup);
+  const RotationChain chain(pair.rate_times_s, rates);
+  PairBearings bearings;
+  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2], &bearings)) {
+    return false;
+  }
+  const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
+  PairRow row(chain.size());
+  for (size_t i = 0; i < pair.matches.size(); ++i) {
+    const Bearing& a = bearings.a[i];
+    const Bearing& b = bearings.b[i];
+    const PlaneResidual r = EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau,
+                                                  pair.variance_a(), pair.variance_b());
+    const RobustResidual robust = Robustify(r.value, pair.robust_threshold);
+    residuals[i] = robust.value;
+    if (jacobians == nullptr) continue;
+    row.Clear();
+    row.Add(a, chain, pair.height_px, r.by_a, r.by_J_a);
+    row.Add(b, chain, pair.height_px, r.by_b, r.by_J_b);
+    row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair.rate_group_sizes,
+              kFirstRateGroup, jacobians);
+    if (jacobians[kTauBlock] != nullptr) {
+      Eigen::Map<Eigen::Vector3d>(jacobians[kTauBlock] + 3 * i) = robust.derivative * r.by_tau;
+    }
+  }
+  return true;
+}
+
+}  // namespace camgyro

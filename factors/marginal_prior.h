@@ -1,0 +1,45 @@
+// What marginalised factors say about the blocks that stay.
+#ifndef CAMGYRO_FACTORS_MARGINAL_PRIOR_H_
+#define CAMGYRO_FACTORS_MARGINAL_PRIOR_H_
+
+#include <ceres/cost_function.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace camgyro {
+
+//   r = S * [ x_1 [-] x_1,lin; x_2 [-] x_2,lin; ... ] + r_0
+//
+// Parameters  the blocks that stay, in the order given; a rotation block (4, [x y z w]) enters by
+//             its tangent, the others by their difference
+// Residual    rows of S, in sigmas
+// Source      square-root form of the Schur complement; see estimator/window/marginalize.h.
+//             The derivative of [-] includes the inverse right Jacobian
+class MarginalPrior final : public ceres::CostFunction {
+ public:
+  struct Block {
+    Eigen::VectorXd linearization;  // ambient values
+    bool is_rotation = false;
+    int tangent_size() const { return is_rotation ? 3 : static_cast<int>(linearization.size()); }
+  };
+
+  // sqrt_information: rows x sum of tangent sizes; offset: rows.
+  MarginalPrior(std::vector<Block> blocks, Eigen::MatrixXd sqrt_information,
+                Eigen::VectorXd offset);
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+  const Eigen::MatrixXd& sqrt_information() const { return sqrt_information_; }
+  const std::vector<Block>& blocks() const { return blocks_; }
+
+ private:
+  const std::vector<Block> blocks_;
+  const Eigen::MatrixXd sqrt_information_;
+  const Eigen::VectorXd offset_;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FACTORS_MARGINAL_PRIOR_H_

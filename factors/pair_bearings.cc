@@ -1,0 +1,67 @@
+#include "factors/pair_bearings.h"
+
+#include "factors/rotation_manifold.h"
+
+namespace camgyro {
+
+bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
+                          const double* lens, const double* shutter, const double* q_gyro_cam,
+                          PairBearings* bearings) {
+  const LensParameters lens_parameters = Eigen::Map<const LensParameters>(lens);
+  const ShutterParameters shutter_parameters = Eigen::Map<const ShutterParameters>(shutter);
+  const Eigen::Matrix3d R_gyro_cam =
+      Eigen::Map<const Eigen::Quaterniond>(q_gyro_cam).normalized().toRotationMatrix();
+  const size_t n = pair.matches.size();
+  bearings->a.resize(n);
+  bearings->b.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    if (!EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
+                         pair.time_a_s, pair.height_px, pair.matches[i].px_a, &bearings->a[i]) ||
+        !EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
+                         pair.time_b_s, pair.height_px, pair.matches[i].px_b, &bearings->b[i])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* const* groups) {
+  int total = 0;
+  for (const int size : group_sizes) total += size;
+  Eigen::Matrix3Xd rates(3, total);
+  int column = 0;
+  for (size_t g = 0; g < group_sizes.size(); ++g) {
+    rates.middleCols(column, group_sizes[g]) =
+        Eigen::Map<const Eigen::Matrix3Xd>(groups[g], 3, group_sizes[g]);
+    column += group_sizes[g];
+  }
+  return rates;
+}
+
+void PairRow::Write(int row, double scale, const double* q_gyro_cam,
+                    const std::vector<int>& group_sizes, int first_rate_group,
+                    double** jacobians) const {
+  if (jacobians[0] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, 1, kLensSize>>(jacobians[0] + row * kLensSize) =
+        scale * gradient_.by_lens;
+  }
+  if (jacobians[1] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, 1, kShutterSize>>(jacobians[1] + row * kShutterSize) =
+        scale * gradient_.by_shutter;
+  }
+  if (jacobians[2] != nullptr) {
+    Eigen::Map<Eigen::RowVector4d>(jacobians[2] + row * 4) =
+        scale * RotationManifold::Lift(gradient_.by_rotation, q_gyro_cam);
+  }
+  int column = 0;
+  for (size_t g = 0; g < group_sizes.size(); ++g) {
+    double* jacobian = jacobians[static_cast<size_t>(first_rate_group) + g];
+    if (jacobian != nullptr) {
+      Eigen::Map<Eigen::Matrix3Xd>(jacobian + row * 3 * group_sizes[g], 3, group_sizes[g]) =
+          scale * by_rates_.middleCols(column, group_sizes[g]);
+    }
+    column += group_sizes[g];
+  }
+}
+
+}  // namespace camgyro

@@ -1,0 +1,75 @@
+// What the coplanarity factors share: the matches of one pair of frames, their parameter blocks,
+// and the way from a derivative by bearings to Ceres' Jacobians.
+#ifndef CAMGYRO_FACTORS_PAIR_BEARINGS_H_
+#define CAMGYRO_FACTORS_PAIR_BEARINGS_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/pair_model.h"
+#include "core/recording.h"
+
+namespace camgyro {
+
+// One pair of frames as the coplanarity factors see it. Times in seconds from the window's origin.
+struct PairMeasurement {
+  std::vector<Match> matches;
+  double time_a_s = 0.0, time_b_s = 0.0;  // recorded stamps of the two frames
+  double height_px = 0.0;
+  double sigma_px = 1.0;  // > 0, per axis of a noisy observation
+  MatchNoise noise = MatchNoise::kBothImages;
+  double robust_threshold = 0.0;  // in sigmas; 0: no loss
+  const Lens* lens = nullptr;
+
+  // Rates that the pair needs: their times, strictly increasing, split into consecutive parameter
+  // blocks of these sizes (in samples).
+  std::vector<double> rate_times_s;
+  std::vector<int> rate_group_sizes;
+
+  double variance_a() const { return noise == MatchNoise::kBothImages ? sigma_px * sigma_px : 0.0; }
+  double variance_b() const { return sigma_px * sigma_px; }
+};
+
+// Order of the parameter blocks of the coplanarity factors:
+//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>),] rate groups
+// q_gyro_cam is stored [x y z w].
+
+struct PairBearings {
+  std::vector<Bearing> a, b;
+};
+
+// Evaluates both bearings of every match; false where the lens has no ray.
+[[nodiscard]] bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
+                                        const double* lens, const double* shutter,
+                                        const double* q_gyro_cam, PairBearings* bearings);
+
+// The rates of all groups as columns.
+Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* const* groups);
+
+// One row of a residual's Jacobian, before it is written to Ceres' blocks.
+class PairRow {
+ public:
+  explicit PairRow(int num_rates) : by_rates_(3, num_rates) {}
+
+  void Clear() {
+    gradient_ = PairGradient();
+    by_rates_.setZero();
+  }
+  // Adds the effect of one bearing (see Backpropagate).
+  void Add(const Bearing& bearing, const RotationChain& chain, double height_px,
+           const Eigen::Vector3d& by_ray, const Eigen::Matrix<double, 3, 2>& by_J_ray_px) {
+    Backpropagate(bearing, chain, height_px, by_ray, by_J_ray_px, &gradient_, by_rates_);
+  }
+  // Writes the row, times `scale`, to the Jacobians of lens, shutter, rotation and rate groups.
+  // Entries of `jacobians` may be null (constant blocks). first_rate_group: index of that block.
+  void Write(int row, double scale, const double* q_gyro_cam, const std::vector<int>& group_sizes,
+             int first_rate_group, double** jacobians) const;
+
+ private:
+  PairGradient gradient_;
+  Eigen::Matrix3Xd by_rates_;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FACTORS_PAIR_BEARINGS_H_

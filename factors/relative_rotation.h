@@ -1,0 +1,47 @@
+// Agreement of a camera rotation with the gyro's rotation over the same, delay-shifted interval.
+#ifndef CAMGYRO_FACTORS_RELATIVE_ROTATION_H_
+#define CAMGYRO_FACTORS_RELATIVE_ROTATION_H_
+
+#include <ceres/cost_function.h>
+
+#include <Eigen/Geometry>
+#include <vector>
+
+namespace camgyro {
+
+//   r = Robustify_norm( Log( R_gyro_b^T R_gyro_a * R_gyro_cam R_cama_camb R_gyro_cam^T ) / sigma )
+//   R_gyro_a, R_gyro_b: the rotation chain at t_a + t_d + row t_r, t_b + t_d + row t_r
+//
+// Parameters  shutter      2   t_d [s], t_r [s]
+//             q_gyro_cam   4   RotationManifold
+//             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
+// Residual    3, in sigmas, in the gyro frame of the second exposure
+// Valid       while the argument of Log turns by less than pi - 0.1 rad; the caller gates
+// Source      Feng, Li & Dai eq. (2); design.md section 3. Neglects: that two neighbouring camera
+//             rotations share the error of the attitude between them
+class RelativeRotation final : public ceres::CostFunction {
+ public:
+  struct Measurement {
+    Eigen::Quaterniond q_a_b;               // vectors of camera b into camera a
+    double time_a_s = 0.0, time_b_s = 0.0;  // stamps, seconds from the window's origin
+    double row_fraction = 0.0;              // row that the rotation refers to, of the height
+    double sigma_rad = 0.0;                 // > 0, per axis
+    double robust_threshold = 0.0;          // in sigmas of each axis; 0: no loss
+    std::vector<double> rate_times_s;
+    std::vector<int> rate_group_sizes;
+  };
+
+  explicit RelativeRotation(Measurement measurement);
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+  static constexpr int kFirstRateGroup = 2;
+
+ private:
+  const Measurement m_;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FACTORS_RELATIVE_ROTATION_H_

@@ -1,0 +1,251 @@
+#include <ceres/ceres.h>
+#include <gmock/gmock.h>
+
+#include "factors/coplanarity_determinant.h"
+#include "factors/coplanarity_plane.h"
+#include "factors/robust.h"
+#include "factors/rotation_manifold.h"
+#include "tests/factors/pair_scene.h"
+#include "tests/factors/reference_plane.h"
+
+namespace camgyro {
+namespace {
+
+using Jet = ceres::Jet<double, 65>;  // 8 + 2 + 4 + 3 + 48 parameters of the scene
+
+std::vector<double> Residuals(const ceres::CostFunction& factor,
+                              const std::vector<double*>& parameters) {
+  std::vector<double> residuals(static_cast<size_t>(factor.num_residuals()), std::nan(""));
+  EXPECT_TRUE(factor.Evaluate(parameters.data(), residuals.data(), nullptr));
+  return residuals;
+}
+
+// All parameters of the scene as jets, in the order of CoplanarityPlane.
+std::vector<Jet> SceneJets(const PairScene& s) {
+  std::vector<double> values(s.lens.data(), s.lens.data() + 8);
+  values.insert(values.end(), s.shutter.data(), s.shutter.data() + 2);
+  values.insert(values.end(), s.q_gyro_cam.coeffs().data(), s.q_gyro_cam.coeffs().data() + 4);
+  values.insert(values.end(), s.tau.data(), s.tau.data() + 3);
+  for (const auto& group : s.rate_groups) {
+    values.insert(values.end(), group.data(), group.data() + group.size());
+  }
+  std::vector<Jet> jets;
+  for (size_t i = 0; i < values.size(); ++i) jets.emplace_back(values[i], static_cast<int>(i));
+  return jets;
+}
+
+// Compares a factor's residuals and tangent-space Jacobians with jets of the reference.
+void ExpectMatchesReference(const ceres::CostFunction& factor, PairScene* s, bool with_tau,
+                            const std::function<Jet(size_t, const std::vector<Jet>&)>& reference) {
+  const auto parameters = s->Parameters(with_tau);
+  const auto& sizes = factor.parameter_block_sizes();
+  std::vector<std::vector<double>> storage;
+  std::vector<double*> jacobians;
+  for (const int size : sizes) {
+    storage.emplace_back(static_cast<size_t>(size * factor.num_residuals()), std::nan(""));
+  }
+  for (auto& block : storage) jacobians.push_back(block.data());
+  std::vector<double> residuals(static_cast<size_t>(factor.num_residuals()), std::nan(""));
+  ASSERT_TRUE(factor.Evaluate(parameters.data(), residuals.data(), jacobians.data()));
+
+  const std::vector<Jet> jets = SceneJets(*s);
+  const Eigen::Matrix<double, 4, 3> plus =
+      RotationManifold::PlusJacobianOf(s->q_gyro_cam.coeffs().data());
+  for (size_t row = 0; row < residuals.size(); ++row) {
+    const Jet expected = reference(row, jets);
+    ASSERT_NEAR(residuals[row], expected.a, 1e-9 * (1 + std::abs(expected.a)));
+    int offset = 0;
+    for (size_t block = 0; block < sizes.size(); ++block) {
+      const int size = sizes[block];
+      if (!with_tau && block == CoplanarityPlane::kTauBlock) offset += 3;
+      const Eigen::VectorXd want = expected.v.segment(offset, size);
+      const Eigen::VectorXd have =
+          Eigen::Map<const Eigen::VectorXd>(jacobians[block] + static_cast<int>(row) * size, size);
+      const double scale = 1.0 + want.norm();
+      if (block == 2) {  // the rotation's row has a meaning only in the tangent
+        EXPECT_LT((plus.transpose() * (have - want)).norm() / scale, 1e-9) << "block 2";
+      } else {
+        EXPECT_LT((have - want).norm() / scale, 1e-9) << "block " << block;
+      }
+      offset += size;
+    }
+  }
+}
+
+TEST(CoplanarityPlane, IsZeroAtTheTruth) {
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    PairScene s = MakePairScene(seed);
+    for (const double r : Residuals(CoplanarityPlane(s.pair), s.Parameters())) {
+      EXPECT_LT(std::abs(r), 1e-8) << seed;
+    }
+  }
+}
+
+// A pixel moved by k sigma across its epipolar line, in the only noisy image, is a residual of k.
+TEST(CoplanarityPlane, ResidualIsTheDistanceFromTheEpipolarLineInSigmas) {
+  PairScene s = MakePairScene(3);
+  s.pair->noise = MatchNoise::kSecondImage;
+  const double step = 1e-4;
+  for (size_t i = 0; i < s.pair->matches.size(); ++i) {
+    SCOPED_TRACE(i);
+    const Eigen::Vector2d px = s.pair->matches[i].px_b;
+    Eigen::Vector2d slope;  // of the residual over the pixel [sigmas / px]
+    for (int k = 0; k < 2; ++k) {
+      s.pair->matches[i].px_b = px + step * Eigen::Vector2d::Unit(k);
+      slope[k] = Residuals(CoplanarityPlane(s.pair), s.Parameters())[i] / step;
+      s.pair->matches[i].px_b = px;
+    }
+    EXPECT_NEAR(slope.norm(), 1.0 / s.pair->sigma_px, 1e-3);
+  }
+}
+
+TEST(CoplanarityPlane, NoiseHasUnitVarianceWhenBothImagesAreNoisy) {
+  PairScene s = MakePairScene(5, 60);
+  std::mt19937_64 generator(7);
+  std::normal_distribution<double> noise(0.0, s.pair->sigma_px);
+  const auto exact = s.pair->matches;
+  double sum_sq = 0.0;
+  int count = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    for (size_t i = 0; i < exact.size(); ++i) {
+      s.pair->matches[i].px_a = exact[i].px_a + Eigen::Vector2d(noise(generator), noise(generator));
+      s.pair->matches[i].px_b = exact[i].px_b + Eigen::Vector2d(noise(generator), noise(generator));
+    }
+    for (const double r : Residuals(CoplanarityPlane(s.pair), s.Parameters())) {
+      sum_sq += r * r;
+      ++count;
+    }
+  }
+  // 6000 residuals: the mean square has a standard deviation of sqrt(2/6000) = 0.018.
+  EXPECT_NEAR(sum_sq / count, 1.0, 0.06);
+}
+
+TEST(CoplanarityPlane, DoesNotDependOnTheSignOfTau) {
+  PairScene s = MakePairScene(4);
+  Disturb(4, &s);
+  const auto r = Residuals(CoplanarityPlane(s.pair), s.Parameters());
+  s.tau = -s.tau;
+  const auto r_flipped = Residuals(CoplanarityPlane(s.pair), s.Parameters());
+  for (size_t i = 0; i < r.size(); ++i) EXPECT_NEAR(r[i], -r_flipped[i], 1e-12);
+}
+
+TEST(CoplanarityPlane, JacobianMatchesAutodiffOfThePlainFormula) {
+  for (uint64_t seed = 0; seed < 4; ++seed) {
+    SCOPED_TRACE(seed);
+    PairScene s = MakePairScene(seed, 4);
+    Disturb(seed, &s);
+    if (seed % 2 == 1) s.pair->noise = MatchNoise::kSecondImage;
+    ExpectMatchesReference(
+        CoplanarityPlane(s.pair), &s, true, [&](size_t row, const std::vector<Jet>& x) {
+          return reference::Plane<Jet>(*s.pair, s.pair->matches[row], x.data(), x.data() + 8,
+                                       x.data() + 10, {x[14], x[15], x[16]},
+                                       {x.begin() + 17, x.end()});
+        });
+  }
+}
+
+TEST(CoplanarityPlane, JacobianMatchesDifferencesWithTheLossOn) {
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    SCOPED_TRACE(seed);
+    PairScene s = MakePairScene(seed);
+    Disturb(seed, &s);
+    s.pair->robust_threshold = 2.0;  // many of the disturbed residuals are beyond
+    const CoplanarityPlane factor(s.pair);
+    RotationManifold rotation;
+    std::vector<const ceres::Manifold*> manifolds(factor.parameter_block_sizes().size(), nullptr);
+    manifolds[2] = &rotation;
+    ceres::NumericDiffOptions options;
+    options.ridders_relative_initial_step_size = 1e-5;
+    const ceres::GradientChecker checker(&factor, &manifolds, options);
+    ceres::GradientChecker::ProbeResults results;
+    const auto parameters = s.Parameters();
+    EXPECT_TRUE(checker.Probe(parameters.data(), 1e-4, &results)) << results.error_log;
+  }
+}
+
+TEST(CoplanarityPlane, RejectsAStepToWhereALensHasNoRay) {
+  PairScene s = MakePairScene(6);
+  s.lens[kK1] = -3.0;
+  std::vector<double> residuals(s.pair->matches.size());
+  EXPECT_FALSE(CoplanarityPlane(s.pair).Evaluate(s.Parameters().data(), residuals.data(), nullptr));
+}
+
+TEST(CoplanarityDeterminant, IsZeroAtTheTruth) {
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    PairScene s = MakePairScene(seed);
+    const CoplanarityDeterminant factor(s.pair, RandomTriplets(12, 30, seed));
+    for (const double r : Residuals(factor, s.Parameters(false))) {
+      EXPECT_LT(std::abs(r), 1e-6) << seed;
+    }
+  }
+}
+
+TEST(CoplanarityDeterminant, NoiseHasUnitVariance) {
+  PairScene s = MakePairScene(8, 60);
+  s.pair->sigma_px = 0.05;  // first-order propagation: noise small against parallax
+  std::mt19937_64 generator(9);
+  std::normal_distribution<double> noise(0.0, s.pair->sigma_px);
+  const auto exact = s.pair->matches;
+  double sum_sq = 0.0;
+  int count = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    for (size_t i = 0; i < exact.size(); ++i) {
+      s.pair->matches[i].px_a = exact[i].px_a + Eigen::Vector2d(noise(generator), noise(generator));
+      s.pair->matches[i].px_b = exact[i].px_b + Eigen::Vector2d(noise(generator), noise(generator));
+    }
+    const CoplanarityDeterminant factor(s.pair, RandomTriplets(60, 60, trial));
+    for (const double r : Residuals(factor, s.Parameters(false))) {
+      sum_sq += r * r;
+      ++count;
+    }
+  }
+  EXPECT_NEAR(sum_sq / count, 1.0, 0.1);  // triplets share matches: fewer than 6000 independent
+}
+
+TEST(CoplanarityDeterminant, JacobianMatchesAutodiffOfThePlainFormula) {
+  for (uint64_t seed = 0; seed < 4; ++seed) {
+    SCOPED_TRACE(seed);
+    PairScene s = MakePairScene(seed, 6);
+    Disturb(seed, &s);
+    if (seed % 2 == 1) s.pair->noise = MatchNoise::kSecondImage;
+    const std::vector<CoplanarityDeterminant::Triplet> triplets = {{0, 1, 2}, {5, 3, 1}};
+    ExpectMatchesReference(CoplanarityDeterminant(s.pair, triplets), &s, false,
+                           [&](size_t row, const std::vector<Jet>& x) {
+                             const Match* matches[3];
+                             for (size_t i = 0; i < 3; ++i) {
+                               matches[i] = &s.pair->matches[static_cast<size_t>(triplets[row][i])];
+                             }
+                             return reference::Determinant<Jet>(*s.pair, matches, x.data(),
+                                                                x.data() + 8, x.data() + 10,
+                                                                {x.begin() + 17, x.end()});
+                           });
+  }
+}
+
+TEST(CoplanarityDeterminant, TripletsAreRepeatableAndOfDifferentMatches) {
+  const auto triplets = RandomTriplets(5, 200, 11);
+  EXPECT_EQ(triplets, RandomTriplets(5, 200, 11));
+  EXPECT_NE(triplets, RandomTriplets(5, 200, 12));
+  for (const auto& t : triplets) {
+    EXPECT_TRUE(t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
+    EXPECT_THAT(t, ::testing::Each(::testing::AllOf(::testing::Ge(0), ::testing::Lt(5))));
+  }
+}
+
+TEST(Robustify, KeepsInliersAndIsContinuousWithItsDerivative) {
+  EXPECT_EQ(Robustify(1.5, 2.0).value, 1.5);
+  EXPECT_EQ(Robustify(-100.0, 0.0).value, -100.0);
+  EXPECT_NEAR(Robustify(2.0 + 1e-9, 2.0).value, 2.0, 1e-8);
+  EXPECT_NEAR(Robustify(2.0 + 1e-9, 2.0).derivative, 1.0, 1e-8);
+  // rho(r^2) = k^2 (1 + log(r^2/k^2)): at r = -2e, k = 2: 4 * 3 = 12.
+  const RobustResidual far = Robustify(-2.0 * M_E, 2.0);
+  EXPECT_NEAR(far.value, -std::sqrt(12.0), 1e-12);
+  const double h = 1e-6;
+  EXPECT_NEAR(
+      far.derivative,
+      (Robustify(-2.0 * M_E + h, 2.0).value - Robustify(-2.0 * M_E - h, 2.0).value) / (2 * h),
+      1e-8);
+}
+
+}  // namespace
+}  // namespace camgyro

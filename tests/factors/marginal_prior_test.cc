@@ -1,0 +1,60 @@
+#include "factors/marginal_prior.h"
+
+#include <ceres/ceres.h>
+#include <gmock/gmock.h>
+
+#include <random>
+
+#include "core/so3.h"
+#include "factors/rotation_manifold.h"
+
+namespace camgyro {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+TEST(MarginalPrior, ResidualIsLinearInTheTangentDifference) {
+  const Quaterniond q_lin = Exp(Vector3d(0.3, 0.1, -0.5));
+  MatrixXd S = MatrixXd::Zero(2, 5);
+  S << 1, 2, 3, 4, 5, 0, 1, 0, -1, 0;
+  const MarginalPrior prior({{(VectorXd(2) << 7, 8).finished(), false}, {q_lin.coeffs(), true}}, S,
+                            (VectorXd(2) << 0.5, -0.25).finished());
+  const Eigen::Vector2d x(7.1, 8.0);
+  const Quaterniond q = q_lin * Exp(Vector3d(0.2, 0, -0.1));
+  Eigen::Vector2d r;
+  const double* parameters[] = {x.data(), q.coeffs().data()};
+  ASSERT_TRUE(prior.Evaluate(parameters, r.data(), nullptr));
+  // delta = (0.1, 0, 0.2, 0, -0.1)
+  EXPECT_NEAR(r[0], 0.1 + 3 * 0.2 - 5 * 0.1 + 0.5, 1e-12);
+  EXPECT_NEAR(r[1], 0.0 - 0.0 - 0.25, 1e-12);
+}
+
+// Half a radian away from the linearisation, where dropping the inverse right Jacobian costs 20 %.
+TEST(MarginalPrior, JacobianMatchesDifferencesFarFromTheLinearisation) {
+  std::mt19937_64 generator(2);
+  std::normal_distribution<double> normal;
+  for (int trial = 0; trial < 20; ++trial) {
+    const Quaterniond q_lin =
+        Exp(Vector3d(normal(generator), normal(generator), normal(generator)));
+    MatrixXd S(4, 5);
+    for (int i = 0; i < S.size(); ++i) S.data()[i] = normal(generator);
+    const MarginalPrior prior({{VectorXd::Zero(2), false}, {q_lin.coeffs(), true}}, S,
+                              VectorXd::Ones(4));
+    Eigen::Vector2d x(0.3, -0.4);
+    Quaterniond q = q_lin * Exp(Vector3d(0.3, -0.3, 0.25));
+    RotationManifold rotation;
+    std::vector<const ceres::Manifold*> manifolds = {nullptr, &rotation};
+    ceres::NumericDiffOptions options;
+    options.ridders_relative_initial_step_size = 1e-5;
+    const ceres::GradientChecker checker(&prior, &manifolds, options);
+    ceres::GradientChecker::ProbeResults results;
+    const double* parameters[] = {x.data(), q.coeffs().data()};
+    EXPECT_TRUE(checker.Probe(parameters, 1e-7, &results)) << results.error_log;
+  }
+}
+
+}  // namespace
+}  // namespace camgyro

@@ -1,0 +1,94 @@
+#include "factors/relative_rotation.h"
+
+#include <ceres/ceres.h>
+#include <gmock/gmock.h>
+
+#include <random>
+
+#include "core/pair_model.h"
+#include "core/rotation_chain.h"
+#include "core/so3.h"
+#include "factors/rotation_manifold.h"
+
+namespace camgyro {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+struct Scene {
+  RelativeRotation::Measurement measurement;
+  ShutterParameters shutter;
+  Quaterniond q_gyro_cam;
+  std::vector<Eigen::Matrix3Xd> groups;
+
+  std::vector<double*> Parameters() {
+    std::vector<double*> p = {shutter.data(), q_gyro_cam.coeffs().data()};
+    for (auto& group : groups) p.push_back(group.data());
+    return p;
+  }
+  Vector3d Residual() {
+    Vector3d r = Vector3d::Constant(std::nan(""));
+    EXPECT_TRUE(RelativeRotation(measurement).Evaluate(Parameters().data(), r.data(), nullptr));
+    return r;
+  }
+};
+
+Scene MakeScene(uint64_t seed) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  const auto random_vector = [&] {
+    return Vector3d(normal(generator), normal(generator), normal(generator));
+  };
+  Scene s;
+  s.shutter << 0.012, 0.02;
+  s.q_gyro_cam = Exp(random_vector());
+  auto& m = s.measurement;
+  m.time_a_s = 0.02;
+  m.time_b_s = 0.09;
+  m.row_fraction = 0.5;
+  m.sigma_rad = 0.002;
+  m.rate_group_sizes = {5, 8};
+  Eigen::Matrix3Xd rates(3, 13);
+  for (int i = 0; i < 13; ++i) {
+    m.rate_times_s.push_back(0.01 * i);
+    rates.col(i) = random_vector();
+  }
+  s.groups = {rates.leftCols(5), rates.rightCols(8)};
+  const RotationChain chain(m.rate_times_s, rates);
+  const Eigen::Matrix3d R_c = s.q_gyro_cam.toRotationMatrix();
+  const double shift = 0.012 + 0.5 * 0.02;
+  m.q_a_b = Quaterniond((chain.At(m.time_a_s + shift).R_ref_gyro * R_c).transpose() *
+                        chain.At(m.time_b_s + shift).R_ref_gyro * R_c);
+  return s;
+}
+
+TEST(RelativeRotation, ResidualIsTheErrorInSigmas) {
+  Scene s = MakeScene(1);
+  EXPECT_LT(s.Residual().norm(), 1e-9);
+  // Turn the second camera by two sigma about the gyro's z axis.
+  const Vector3d turn_gyro_rad(0, 0, 2 * s.measurement.sigma_rad);
+  s.measurement.q_a_b =
+      s.measurement.q_a_b * Exp(Vector3d(s.q_gyro_cam.conjugate() * turn_gyro_rad));
+  EXPECT_LT((s.Residual() - Vector3d(0, 0, 2)).norm(), 1e-9);
+}
+
+TEST(RelativeRotation, JacobianMatchesDifferences) {
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE(seed);
+    Scene s = MakeScene(seed);
+    s.shutter[kDelay] += 0.0013;
+    s.q_gyro_cam = s.q_gyro_cam * Exp(Vector3d(0.1, -0.2, 0.15));
+    const RelativeRotation factor(s.measurement);
+    RotationManifold rotation;
+    std::vector<const ceres::Manifold*> manifolds = {nullptr, &rotation, nullptr, nullptr};
+    ceres::NumericDiffOptions options;
+    options.ridders_relative_initial_step_size = 1e-5;
+    const ceres::GradientChecker checker(&factor, &manifolds, options);
+    ceres::GradientChecker::ProbeResults results;
+    EXPECT_TRUE(checker.Probe(s.Parameters().data(), 1e-4, &results)) << results.error_log;
+  }
+}
+
+}  // namespace
+}  // namespace camgyro

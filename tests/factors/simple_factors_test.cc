@@ -1,0 +1,48 @@
+#include <ceres/ceres.h>
+#include <gmock/gmock.h>
+
+#include "factors/bias_walk.h"
+#include "factors/gyro_rate.h"
+
+namespace camgyro {
+namespace {
+
+bool ProbeDerivatives(const ceres::CostFunction& factor, const std::vector<double*>& parameters) {
+  std::vector<const ceres::Manifold*> manifolds(parameters.size(), nullptr);
+  ceres::NumericDiffOptions options;
+  options.ridders_relative_initial_step_size = 1e-5;
+  const ceres::GradientChecker checker(&factor, &manifolds, options);
+  ceres::GradientChecker::ProbeResults results;
+  const bool good = checker.Probe(parameters.data(), 1e-7, &results);
+  if (!good) ADD_FAILURE() << results.error_log;
+  return good;
+}
+
+// Measured = true + bias + noise: at the truth the residual is minus the noise, in sigmas.
+TEST(GyroRate, ResidualIsMinusTheNoiseInSigmas) {
+  const Eigen::Vector3d bias(0.01, -0.02, 0.03), noise(0.003, -0.006, 0.0);
+  Eigen::Matrix3Xd truth(3, 2);
+  truth << 1, 2, 3, 4, 5, 6;
+  Eigen::Matrix3Xd measured = truth.colwise() + bias;
+  measured.col(1) += noise;
+  const GyroRate factor(measured, 0.003);
+  Eigen::Matrix<double, 6, 1> r = Eigen::Matrix<double, 6, 1>::Constant(std::nan(""));
+  const double* parameters[] = {truth.data(), bias.data()};
+  ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
+  EXPECT_LT((r - (Eigen::Matrix<double, 6, 1>() << 0, 0, 0, -1, 2, 0).finished()).norm(), 1e-10);
+  Eigen::Vector3d b = bias;
+  EXPECT_TRUE(ProbeDerivatives(factor, {truth.data(), b.data()}));
+}
+
+// Density 0.002 rad/s/sqrt(s) over 4 s: one sigma is 0.004 rad/s.
+TEST(BiasWalk, ResidualIsTheStepInSigmas) {
+  const BiasWalk factor(0.002, 4.0);
+  Eigen::Vector3d b0(0.1, 0.2, 0.3), b1(0.104, 0.2, 0.292), r;
+  const double* parameters[] = {b0.data(), b1.data()};
+  ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
+  EXPECT_LT((r - Eigen::Vector3d(1, 0, -2)).norm(), 1e-10);
+  EXPECT_TRUE(ProbeDerivatives(factor, {b0.data(), b1.data()}));
+}
+
+}  // namespace
+}  // namespace camgyro
