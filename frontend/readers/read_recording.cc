@@ -3,16 +3,18 @@
 #include <filesystem>
 
 #include "frontend/readers/folder_reader.h"
+#include "frontend/readers/gopro_reader.h"
 #include "frontend/readers/text.h"
 
 namespace camgyro {
 
 Result<Recording> ReadRecording(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::is_directory(path, error)) {
-    return BadInput(Concat(path, ": is not a folder; expected a recording folder"));
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) {
+    return BadInput(Concat(path, ": does not exist; expected a recording folder or a GoPro MP4"));
   }
-  return ReadFolder(path);
+  return std::filesystem::is_directory(status) ? ReadFolder(path) : ReadGoPro(path);
 }
 
 }  // namespace camgyro
