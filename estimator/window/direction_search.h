@@ -1,0 +1,27 @@
+// The translation direction of one pair at a given calibration: the inner minimisation that trap
+// one of design.md section 5 warns of.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_DIRECTION_SEARCH_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_DIRECTION_SEARCH_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "factors/pair_bearings.h"
+
+namespace camgyro {
+
+struct DirectionEstimate {
+  Eigen::Vector3d tau = Eigen::Vector3d::UnitZ();
+  double cost = 0.0;              // sum of squared robust residuals [sigmas^2]
+  std::vector<double> residuals;  // one per match, in sigmas, without loss
+};
+
+// Minimises the robust plane residuals over the unit sphere: cost on a fixed grid of directions
+// and at the cross products of some pairs of matches, then Gauss-Newton with the derivative of
+// sigma from the best three. Deterministic.
+DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
+                                double robust_threshold);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_DIRECTION_SEARCH_H_

@@ -1,0 +1,128 @@
+// Parameter blocks and factors under stable names: the only place where a ceres::Problem exists.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_FACTOR_GRAPH_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_FACTOR_GRAPH_H_
+
+#include <ceres/cost_function.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace camgyro {
+
+// What a block is. Order of the enumeration and of the index is the order of solving.
+enum class BlockKind { kLens, kShutter, kRotation, kBias, kRates, kDirection };
+
+struct BlockId {
+  BlockKind kind = BlockKind::kLens;
+  int64_t index = 0;
+
+  bool operator<(const BlockId& other) const {
+    return kind != other.kind ? kind < other.kind : index < other.index;
+  }
+  bool operator==(const BlockId& other) const { return kind == other.kind && index == other.index; }
+};
+
+enum class Geometry {
+  kEuclidean,
+  kRotation,   // 4 numbers [x y z w], RotationManifold
+  kDirection,  // 3 numbers, unit vector, SphereManifold<3>
+};
+
+struct Block {
+  Geometry geometry = Geometry::kEuclidean;
+  Eigen::VectorXd value;
+  std::vector<int> constant;  // coordinates that keep their value; Euclidean blocks only
+
+  int tangent_size() const {
+    if (geometry == Geometry::kRotation) return 3;
+    if (geometry == Geometry::kDirection) return 2;
+    return static_cast<int>(value.size() - static_cast<Eigen::Index>(constant.size()));
+  }
+};
+
+struct Factor {
+  std::shared_ptr<const ceres::CostFunction> cost;
+  std::vector<BlockId> blocks;
+};
+
+struct SolveOptions {
+  int max_iterations = 10;
+  // Stops when an iteration lowers the cost by less than this fraction of it.
+  double function_tolerance = 1e-6;
+};
+
+struct SolveReport {
+  bool usable = false;  // numerical success; values are unchanged otherwise
+  int iterations = 0;
+  double initial_cost = 0.0, final_cost = 0.0;
+  std::string message;
+};
+
+// Residuals and tangent-space Jacobian of some factors by some blocks. Columns follow `blocks`,
+// each with its tangent size; the tangent of a direction block is the one of its manifold.
+struct Linearization {
+  std::vector<BlockId> blocks;
+  std::vector<int> offsets;  // first column of each block, and the number of columns at the end
+  Eigen::MatrixXd J;
+  Eigen::VectorXd residuals;
+};
+
+class FactorGraph {
+ public:
+  using FactorKey = int64_t;
+
+  // CHECKs that the block is new.
+  void AddBlock(const BlockId& id, Block block);
+  // CHECKs that the blocks exist and have the sizes that the cost function expects.
+  FactorKey AddFactor(std::shared_ptr<const ceres::CostFunction> cost, std::vector<BlockId> blocks);
+  void RemoveFactor(FactorKey key) { factors_.erase(key); }
+
+  bool Has(const BlockId& id) const { return blocks_.count(id) > 0; }
+  const Block& block(const BlockId& id) const { return blocks_.at(id); }
+  Eigen::VectorXd& value(const BlockId& id) { return blocks_.at(id).value; }
+  const Eigen::VectorXd& value(const BlockId& id) const { return blocks_.at(id).value; }
+  const std::map<BlockId, Block>& blocks() const { return blocks_; }
+  const std::map<FactorKey, Factor>& factors() const { return factors_; }
+
+  // Levenberg-Marquardt on all factors (Ceres, sparse normal Cholesky, one thread: repeatable).
+  SolveReport Solve(const SolveOptions& options);
+
+  // Linear functionals of the state with their covariance. Row i of a functional is the sum over
+  // blocks of weight * (coordinate of the block's tangent).
+  struct FunctionalTerm {
+    BlockId block;
+    int coordinate = 0;  // of the tangent
+    double weight = 1.0;
+  };
+  using Functional = std::vector<FunctionalTerm>;
+  struct CovarianceReport {
+    bool usable = false;  // false: the information matrix is not positive definite
+    Eigen::MatrixXd covariance;
+    // Influence of each factor: minus the first-order effect of its residuals on the functionals
+    // (one column per functional); sums to zero at the optimum.
+    std::map<FactorKey, Eigen::VectorXd> influence;
+  };
+  CovarianceReport Covariance(const std::vector<Functional>& functionals) const;
+
+  // Linearises the given factors by the blocks that they touch (sorted by id).
+  Linearization Linearize(const std::vector<FactorKey>& keys) const;
+
+  // Removes `leaving` and every factor that touches them, and adds a MarginalPrior that says the
+  // same about the neighbours. Returns the number of directions of `leaving` that no factor
+  // determined (0 in a sound window). No neighbours: nothing is added.
+  int Marginalize(const std::vector<BlockId>& leaving);
+
+ private:
+  std::map<BlockId, Block> blocks_;
+  std::map<FactorKey, Factor> factors_;
+  FactorKey next_key_ = 0;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_FACTOR_GRAPH_H_

@@ -1,0 +1,388 @@
+#include "estimator/window/pair_graph.h"
+
+#include <glog/logging.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/so3.h"
+#include "estimator/window/direction_search.h"
+#include "factors/bias_walk.h"
+#include "factors/coplanarity_determinant.h"
+#include "factors/coplanarity_plane.h"
+#include "factors/gyro_rate.h"
+#include "factors/marginal_prior.h"
+#include "factors/relative_rotation.h"
+
+namespace camgyro {
+namespace {
+
+const BlockId kLensBlock{BlockKind::kLens, 0};
+const BlockId kShutterBlock{BlockKind::kShutter, 0};
+const BlockId kRotationBlock{BlockKind::kRotation, 0};
+BlockId BiasBlock(int64_t index) { return {BlockKind::kBias, index}; }
+BlockId RatesBlock(int64_t index) { return {BlockKind::kRates, index}; }
+BlockId DirectionBlock(int64_t index) { return {BlockKind::kDirection, index}; }
+
+// A gap of the gyro: longer than several sampling intervals.
+constexpr double kGapIntervals = 5.0;
+constexpr double kGapFloorS = 0.03;
+
+std::vector<double> Intervals(const std::deque<TimedRate>& samples) {
+  std::vector<double> intervals;
+  for (size_t i = 1; i < samples.size(); ++i) {
+    intervals.push_back(samples[i].time_s - samples[i - 1].time_s);
+  }
+  return intervals;
+}
+
+}  // namespace
+
+PairGraph::PairGraph(const Calibration& start, const Calibration& prior_mean,
+                     const PairGraphOptions& options)
+    : options_(options), prior_mean_(prior_mean) {
+  const StateVector& sigma = start.prior_sigma;
+  CHECK((sigma.array() > 0.0).all());
+  Block lens{Geometry::kEuclidean, start.lens, {}};
+  for (int k = kAspect; k < kLensSize; ++k) lens.constant.push_back(k);
+  graph_.AddBlock(kLensBlock, std::move(lens));
+  graph_.AddBlock(kShutterBlock,
+                  {Geometry::kEuclidean, ShutterParameters(start.delay_s, start.readout_s), {}});
+  graph_.AddBlock(kRotationBlock, {Geometry::kRotation, start.q_gyro_cam.coeffs(), {}});
+
+  const int size = kLensSize + kShutterSize + 3;
+  Eigen::VectorXd inv_sigma = Eigen::VectorXd::Zero(size);
+  inv_sigma[kFocal] = 1.0 / sigma[kStateFocal];
+  inv_sigma[kCx] = 1.0 / sigma[kStateCx];
+  inv_sigma[kCy] = 1.0 / sigma[kStateCy];
+  inv_sigma[kLensSize + kDelay] = 1.0 / sigma[kStateDelay];
+  inv_sigma[kLensSize + kReadout] = 1.0 / sigma[kStateReadout];
+  inv_sigma.tail<3>() = sigma.segment<3>(kStateRotation).cwiseInverse();
+  graph_.AddFactor(std::make_shared<MarginalPrior>(
+                       std::vector<MarginalPrior::Block>{
+                           {prior_mean.lens, false},
+                           {ShutterParameters(prior_mean.delay_s, prior_mean.readout_s), false},
+                           {prior_mean.q_gyro_cam.coeffs(), true}},
+                       inv_sigma.asDiagonal(), Eigen::VectorXd::Zero(size)),
+                   {kLensBlock, kShutterBlock, kRotationBlock});
+  prior_mean_.prior_sigma = sigma;
+  start_bias_ = start.bias_gyro_rad_s;
+}
+
+void PairGraph::AddRate(const TimedRate& rate) {
+  if (!samples_.empty()) CHECK_GT(rate.time_s, samples_.back().time_s);
+  samples_.push_back(rate);
+  if (samples_.size() == 50 || (samples_.size() < 50 && samples_.size() >= 3)) {
+    std::vector<double> intervals = Intervals(samples_);
+    std::nth_element(intervals.begin(), intervals.begin() + intervals.size() / 2, intervals.end());
+    median_interval_s_ = intervals[intervals.size() / 2];
+  }
+}
+
+void PairGraph::AddBias(int64_t index) {
+  if (graph_.Has(BiasBlock(index))) return;
+  // The newest bias before it, if any is left.
+  const Block* previous = nullptr;
+  int64_t previous_index = 0;
+  for (const auto& [id, block] : graph_.blocks()) {
+    if (id.kind == BlockKind::kBias && id.index < index) {
+      previous = &block;
+      previous_index = id.index;
+    }
+  }
+  const Eigen::VectorXd value = previous ? previous->value : Eigen::VectorXd(start_bias_);
+  graph_.AddBlock(BiasBlock(index), {Geometry::kEuclidean, value, {}});
+  if (previous) {
+    graph_.AddFactor(std::make_shared<BiasWalk>(
+                         options_.bias_walk_rad_s2_rtHz,
+                         options_.bias_interval_s * static_cast<double>(index - previous_index)),
+                     {BiasBlock(previous_index), BiasBlock(index)});
+  } else {
+    const Eigen::Vector3d inv_sigma = prior_mean_.prior_sigma.segment<3>(kStateBias).cwiseInverse();
+    graph_.AddFactor(std::make_shared<MarginalPrior>(
+                         std::vector<MarginalPrior::Block>{{prior_mean_.bias_gyro_rad_s, false}},
+                         inv_sigma.asDiagonal(), Eigen::VectorXd::Zero(3)),
+                     {BiasBlock(index)});
+  }
+}
+
+AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, std::vector<int64_t>* groups,
+                                        std::vector<double>* times, std::vector<int>* sizes) {
+  if (samples_.size() < 3 || samples_.back().time_s < to_s) return AddPairResult::kGyroTooLate;
+  if (samples_.front().time_s > from_s) return AddPairResult::kGyroTooEarly;
+  const auto by_time = [](const TimedRate& rate, double t) { return rate.time_s < t; };
+  // First needed: the last sample not after from_s; last needed: the first not before to_s.
+  const auto lower = std::lower_bound(samples_.begin(), samples_.end(), from_s, by_time);
+  int64_t first = first_sample_ + (lower - samples_.begin());
+  if (sample(first).time_s > from_s) --first;
+  const int64_t last =
+      first_sample_ +
+      (std::lower_bound(samples_.begin(), samples_.end(), to_s, by_time) - samples_.begin());
+  for (int64_t i = first; i < last; ++i) {
+    const double gap = sample(i + 1).time_s - sample(i).time_s;
+    if (gap > std::max(kGapFloorS, kGapIntervals * median_interval_s_)) {
+      return AddPairResult::kGyroGap;
+    }
+  }
+  // Groups that exist and reach into the span; then one new group with the rest.
+  int64_t covered_until = first;  // first sample not yet covered
+  for (const auto& [id, group] : groups_) {
+    if (group.first_sample + group.count <= first) continue;
+    if (group.first_sample > last) break;
+    // A pair that goes back before the first group cannot be served: samples are missing.
+    if (groups->empty() && group.first_sample > first) return AddPairResult::kGyroTooEarly;
+    groups->push_back(id);
+    covered_until = group.first_sample + group.count;
+  }
+  if (covered_until <= last) {
+    RateGroup group;
+    group.first_sample = covered_until;
+    group.count = static_cast<int>(last + 1 - covered_until);
+    group.bias_index =
+        static_cast<int64_t>(std::floor(sample(covered_until).time_s / options_.bias_interval_s));
+    AddBias(group.bias_index);
+    Eigen::Matrix3Xd measured(3, group.count);
+    for (int i = 0; i < group.count; ++i) {
+      measured.col(i) = sample(covered_until + i).omega_gyro_rad_s;
+    }
+    const Eigen::Vector3d bias = graph_.value(BiasBlock(group.bias_index));
+    const Eigen::Matrix3Xd rates = measured.colwise() - bias;
+    const int64_t id = next_group_++;
+    graph_.AddBlock(
+        RatesBlock(id),
+        {Geometry::kEuclidean, Eigen::Map<const Eigen::VectorXd>(rates.data(), rates.size()), {}});
+    group.factor = graph_.AddFactor(std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s),
+                                    {RatesBlock(id), BiasBlock(group.bias_index)});
+    groups_.emplace(id, group);
+    groups->push_back(id);
+  }
+  for (const int64_t id : *groups) {
+    const RateGroup& group = groups_.at(id);
+    sizes->push_back(group.count);
+    for (int i = 0; i < group.count; ++i) times->push_back(sample(group.first_sample + i).time_s);
+  }
+  return AddPairResult::kAdded;
+}
+
+AddPairResult PairGraph::AddPair(int64_t id, double time_a_s, double time_b_s,
+                                 const std::vector<Match>& matches) {
+  CHECK(pairs_.count(id) == 0);
+  const LensParameters lens = graph_.value(kLensBlock);
+  const Eigen::VectorXd& shutter = graph_.value(kShutterBlock);
+  Pair pair;
+  pair.time_s = time_a_s;
+  pair.measurement = std::make_shared<PairMeasurement>();
+  PairMeasurement& m = *pair.measurement;
+  m.lens = &GetLens(prior_mean_.distortion_model);
+  RayJet ray;
+  for (const Match& match : matches) {
+    if (m.lens->Unproject(match.px_a, lens, &ray) && m.lens->Unproject(match.px_b, lens, &ray)) {
+      m.matches.push_back(match);
+    }
+  }
+  if (static_cast<int>(m.matches.size()) < kMinMatches) return AddPairResult::kTooFewMatches;
+  const double readout = shutter[kReadout];
+  const double from = time_a_s + shutter[kDelay] + std::min(0.0, readout) - options_.rate_margin_s;
+  const double to = time_b_s + shutter[kDelay] + std::max(0.0, readout) + options_.rate_margin_s;
+  const AddPairResult covered =
+      CoverWithRates(from, to, &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
+  if (covered != AddPairResult::kAdded) return covered;
+  m.time_a_s = time_a_s;
+  m.time_b_s = time_b_s;
+  m.height_px = prior_mean_.height_px;
+  m.sigma_px = options_.sigma_px;
+  m.noise = options_.match_noise;
+  m.robust_threshold = options_.robust_threshold;
+
+  std::vector<BlockId> blocks = {kLensBlock, kShutterBlock, kRotationBlock};
+  if (options_.residual == ResidualKind::kPlane) {
+    graph_.AddBlock(DirectionBlock(id), {Geometry::kDirection, Eigen::Vector3d::UnitZ(), {}});
+    blocks.push_back(DirectionBlock(id));
+  }
+  for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
+  if (options_.residual == ResidualKind::kPlane) {
+    pair.factor = graph_.AddFactor(std::make_shared<CoplanarityPlane>(pair.measurement), blocks);
+  } else {
+    const int count = static_cast<int>(m.matches.size());
+    pair.factor = graph_.AddFactor(
+        std::make_shared<CoplanarityDeterminant>(
+            pair.measurement, RandomTriplets(count, count, static_cast<uint64_t>(id) + 1)),
+        blocks);
+  }
+  pairs_.emplace(id, std::move(pair));
+  if (options_.residual == ResidualKind::kPlane) Residuals(id, /*search=*/true);
+  return AddPairResult::kAdded;
+}
+
+AddPairResult PairGraph::AddRotation(int64_t id, double time_a_s, double time_b_s,
+                                     const Eigen::Quaterniond& q_a_b, double sigma_rad) {
+  CHECK(pairs_.count(id) == 0);
+  const double delay = graph_.value(kShutterBlock)[kDelay];
+  Pair pair;
+  pair.time_s = time_a_s;
+  RelativeRotation::Measurement m;
+  const AddPairResult covered = CoverWithRates(time_a_s + delay - options_.rate_margin_s,
+                                               time_b_s + delay + options_.rate_margin_s,
+                                               &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
+  if (covered != AddPairResult::kAdded) return covered;
+  m.q_a_b = q_a_b;
+  m.time_a_s = time_a_s;
+  m.time_b_s = time_b_s;
+  m.sigma_rad = sigma_rad;
+  m.robust_threshold = options_.robust_threshold;
+  std::vector<BlockId> blocks = {kShutterBlock, kRotationBlock};
+  for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
+  pair.factor = graph_.AddFactor(std::make_shared<RelativeRotation>(std::move(m)), blocks);
+  pairs_.emplace(id, std::move(pair));
+  return AddPairResult::kAdded;
+}
+
+SolveReport PairGraph::Solve(const SolveOptions& options) { return graph_.Solve(options); }
+
+void PairGraph::MarginalizeOldest() {
+  CHECK(!pairs_.empty());
+  const auto oldest = pairs_.begin();
+  std::set<int64_t> still_needed;
+  for (auto it = std::next(oldest); it != pairs_.end(); ++it) {
+    still_needed.insert(it->second.groups.begin(), it->second.groups.end());
+  }
+  // The last group stays: the next pair will start inside it.
+  if (!groups_.empty()) still_needed.insert(groups_.rbegin()->first);
+  std::vector<BlockId> leaving;
+  if (graph_.Has(DirectionBlock(oldest->first))) leaving.push_back(DirectionBlock(oldest->first));
+  for (auto it = groups_.begin(); it != groups_.end() && still_needed.count(it->first) == 0;) {
+    leaving.push_back(RatesBlock(it->first));
+    it = groups_.erase(it);
+  }
+  const int64_t first_bias = groups_.empty() ? 0 : groups_.begin()->second.bias_index;
+  for (const auto& [id, block] : graph_.blocks()) {
+    if (id.kind == BlockKind::kBias && id.index < first_bias) leaving.push_back(id);
+  }
+  // Determinants have no direction of their own: what they touch may stay, the factor must leave.
+  if (leaving.empty()) {
+    graph_.RemoveFactor(oldest->second.factor);
+  } else {
+    graph_.Marginalize(leaving);
+  }
+  pairs_.erase(oldest);
+}
+
+void PairGraph::ForgetOldRates() {
+  if (groups_.empty()) return;
+  const int64_t keep = groups_.begin()->second.first_sample;
+  while (first_sample_ < keep && samples_.size() > 1) {
+    samples_.pop_front();
+    ++first_sample_;
+  }
+}
+
+std::vector<int64_t> PairGraph::pair_ids() const {
+  std::vector<int64_t> ids;
+  for (const auto& entry : pairs_) ids.push_back(entry.first);
+  return ids;
+}
+
+std::vector<const double*> PairGraph::PairParameters(const Pair& pair) const {
+  std::vector<const double*> p = {graph_.value(kLensBlock).data(),
+                                  graph_.value(kShutterBlock).data(),
+                                  graph_.value(kRotationBlock).data()};
+  for (const int64_t group : pair.groups) p.push_back(graph_.value(RatesBlock(group)).data());
+  return p;
+}
+
+std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
+  const Pair& pair = pairs_.at(id);
+  std::vector<double> residuals;
+  if (pair.measurement == nullptr) {
+    residuals.resize(3);
+    std::vector<const double*> p = {graph_.value(kShutterBlock).data(),
+                                    graph_.value(kRotationBlock).data()};
+    for (const int64_t group : pair.groups) p.push_back(graph_.value(RatesBlock(group)).data());
+    CHECK(graph_.factors().at(pair.factor).cost->Evaluate(p.data(), residuals.data(), nullptr));
+    return residuals;
+  }
+  const PairMeasurement& m = *pair.measurement;
+  const std::vector<const double*> p = PairParameters(pair);
+  const RotationChain chain(m.rate_times_s, GatherRates(m.rate_group_sizes, p.data() + 3));
+  PairBearings bearings;
+  if (!EvaluatePairBearings(m, chain, p[0], p[1], p[2], &bearings)) return residuals;
+  if (search || options_.residual != ResidualKind::kPlane) {
+    const DirectionEstimate direction =
+        FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold);
+    if (graph_.Has(DirectionBlock(id))) graph_.value(DirectionBlock(id)) = direction.tau;
+    return direction.residuals;
+  }
+  const Eigen::Vector3d tau = graph_.value(DirectionBlock(id));
+  for (size_t i = 0; i < m.matches.size(); ++i) {
+    residuals.push_back(EvaluatePlaneResidual(bearings.a[i].ray_ref, bearings.a[i].J_ray_px,
+                                              bearings.b[i].ray_ref, bearings.b[i].J_ray_px, tau,
+                                              m.variance_a(), m.variance_b())
+                            .value);
+  }
+  return residuals;
+}
+
+Calibration PairGraph::Estimate() const {
+  Calibration c = prior_mean_;
+  c.lens = graph_.value(kLensBlock);
+  c.delay_s = graph_.value(kShutterBlock)[kDelay];
+  c.readout_s = graph_.value(kShutterBlock)[kReadout];
+  c.q_gyro_cam = Eigen::Quaterniond(Eigen::Vector4d(graph_.value(kRotationBlock))).normalized();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const auto& [id, block] : graph_.blocks()) {
+    if (id.kind != BlockKind::kBias) continue;
+    sum += Eigen::Vector3d(block.value);
+    ++count;
+  }
+  c.bias_gyro_rad_s = count > 0 ? Eigen::Vector3d(sum / count) : start_bias_;
+  return c;
+}
+
+bool PairGraph::EstimateCovariance(double cluster_s, Calibration* calibration) const {
+  std::vector<FactorGraph::Functional> functionals(kStateSize);
+  functionals[kStateFocal] = {{kLensBlock, 0}};
+  functionals[kStateCx] = {{kLensBlock, 1}};
+  functionals[kStateCy] = {{kLensBlock, 2}};
+  functionals[kStateReadout] = {{kShutterBlock, kReadout}};
+  functionals[kStateDelay] = {{kShutterBlock, kDelay}};
+  std::vector<BlockId> biases;
+  for (const auto& [id, block] : graph_.blocks()) {
+    if (id.kind == BlockKind::kBias) biases.push_back(id);
+  }
+  if (biases.empty()) return false;
+  for (int k = 0; k < 3; ++k) {
+    for (const BlockId& id : biases) {
+      functionals[kStateBias + k].push_back({id, k, 1.0 / static_cast<double>(biases.size())});
+    }
+    functionals[kStateRotation + k] = {{kRotationBlock, k}};
+  }
+  const FactorGraph::CovarianceReport report = graph_.Covariance(functionals);
+  if (!report.usable) return false;
+  calibration->covariance = report.covariance;
+
+  // Clustered covariance: the sum over stretches of time of each stretch's influence.
+  std::map<int64_t, StateVector> clusters;
+  const auto add = [&](FactorGraph::FactorKey key, double time_s) {
+    const auto cluster = static_cast<int64_t>(std::floor(time_s / cluster_s));
+    auto [it, fresh] = clusters.try_emplace(cluster, StateVector::Zero());
+    it->second += report.influence.at(key);
+  };
+  for (const auto& entry : pairs_) add(entry.second.factor, entry.second.time_s);
+  for (const auto& entry : groups_) {
+    add(entry.second.factor, sample(entry.second.first_sample).time_s - calibration->delay_s);
+  }
+  const auto count = static_cast<double>(clusters.size());
+  if (clusters.size() < 8) return true;
+  StateVector variance = StateVector::Zero();
+  for (const auto& entry : clusters) variance += entry.second.cwiseAbs2();
+  variance *= count / (count - 1.0);
+  const StateVector inflation =
+      (variance.cwiseQuotient(calibration->covariance.diagonal())).cwiseMax(1.0).cwiseSqrt();
+  calibration->covariance =
+      inflation.asDiagonal() * calibration->covariance * inflation.asDiagonal();
+  return true;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,131 @@
+// The estimation problem of camgyro as a factor graph: one set of global parameters, a translation
+// direction per pair of frames, rates and biases along the gyro's time. The sliding window and the
+// refinement are two ways to fill and empty it.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_PAIR_GRAPH_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_PAIR_GRAPH_H_
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/recording.h"
+#include "estimator/window/factor_graph.h"
+#include "factors/pair_bearings.h"
+
+namespace camgyro {
+
+enum class ResidualKind { kPlane, kDeterminant };
+
+struct PairGraphOptions {
+  ResidualKind residual = ResidualKind::kPlane;
+  MatchNoise match_noise = MatchNoise::kBothImages;
+  double sigma_px = 1.0;            // of the pairs added from now on
+  double robust_threshold = 2.5;    // in sigmas; 0: none
+  double gyro_sigma_rad_s = 0.003;  // white noise of one sample (Jia & Evans section V.C)
+  double bias_walk_rad_s2_rtHz = 1e-4;
+  double bias_interval_s = 1.0;  // one bias block for each interval
+  // Samples kept on both sides of a pair, so that delay and readout can move in a solve. Beyond,
+  // rates are held.
+  double rate_margin_s = 0.004;
+};
+
+// One gyro sample of the graph's clock: seconds from the graph's origin.
+struct TimedRate {
+  double time_s = 0.0;
+  Eigen::Vector3d omega_gyro_rad_s = Eigen::Vector3d::Zero();
+};
+
+enum class AddPairResult {
+  kAdded,
+  kGyroTooLate,    // the samples do not reach to the end of the pair yet
+  kGyroTooEarly,   // samples at the start of the pair are missing or were dropped
+  kGyroGap,        // a hole in the gyro samples inside the pair
+  kTooFewMatches,  // fewer than PairGraph::kMinMatches with a ray
+};
+
+class PairGraph {
+ public:
+  static constexpr int kMinMatches = 8;
+
+  // start: values, and prior_sigma as the standard deviations of a Gaussian prior around
+  // `prior_mean` (zero bias, guess of the files, ...).
+  PairGraph(const Calibration& start, const Calibration& prior_mean,
+            const PairGraphOptions& options);
+
+  // Samples in time order (CHECKed).
+  void AddRate(const TimedRate& rate);
+  // Adds the coplanarity of a pair; pairs come in the order of their first frame. Times are
+  // recorded stamps in seconds from the graph's origin.
+  AddPairResult AddPair(int64_t id, double time_a_s, double time_b_s,
+                        const std::vector<Match>& matches);
+  // Adds a rotation between two camera attitudes (no pixels). sigma_rad > 0 per axis.
+  AddPairResult AddRotation(int64_t id, double time_a_s, double time_b_s,
+                            const Eigen::Quaterniond& q_a_b, double sigma_rad);
+
+  SolveReport Solve(const SolveOptions& options);
+
+  // Marginalises the oldest pair with its direction and the rates and biases that only it needs.
+  void MarginalizeOldest();
+  // Drops samples that no pair to come can need: those before the oldest pair's.
+  void ForgetOldRates();
+
+  int num_pairs() const { return static_cast<int>(pairs_.size()); }
+  std::vector<int64_t> pair_ids() const;
+
+  // Whitened residuals of a pair at the present estimate, without loss. Plane: with its direction
+  // minimised anew when `search` is set (and stored). Empty if a ray is missing.
+  std::vector<double> Residuals(int64_t id, bool search);
+  double sigma_px(int64_t id) const { return pairs_.at(id).measurement->sigma_px; }
+  // Sets the pixel noise of a pair already in the graph.
+  void SetSigmaPx(int64_t id, double sigma_px) { pairs_.at(id).measurement->sigma_px = sigma_px; }
+  PairGraphOptions* options() { return &options_; }
+
+  // The estimate. With covariance: of the present graph, inflated by the clustered (sandwich)
+  // covariance where that is larger; `cluster_s` is the length of a cluster, and there must be at
+  // least 8 of them. The bias is the mean over its blocks.
+  Calibration Estimate() const;
+  bool EstimateCovariance(double cluster_s, Calibration* calibration) const;
+
+  const FactorGraph& graph() const { return graph_; }
+
+ private:
+  struct RateGroup {
+    int64_t first_sample = 0;  // absolute sample number
+    int count = 0;
+    int64_t bias_index = 0;
+    FactorGraph::FactorKey factor = 0;
+  };
+  struct Pair {
+    std::shared_ptr<PairMeasurement> measurement;  // null for rotations
+    std::vector<int64_t> groups;
+    FactorGraph::FactorKey factor = 0;
+    double time_s = 0.0;
+  };
+
+  // Makes the rate groups that cover [from_s, to_s] on the gyro clock; fills their ids.
+  AddPairResult CoverWithRates(double from_s, double to_s, std::vector<int64_t>* groups,
+                               std::vector<double>* times, std::vector<int>* sizes);
+  void AddBias(int64_t index);
+  const TimedRate& sample(int64_t number) const {
+    return samples_[static_cast<size_t>(number - first_sample_)];
+  }
+  std::vector<const double*> PairParameters(const Pair& pair) const;
+
+  PairGraphOptions options_;
+  Calibration prior_mean_;
+  Eigen::Vector3d start_bias_ = Eigen::Vector3d::Zero();  // value of the first bias block
+  FactorGraph graph_;
+  std::deque<TimedRate> samples_;
+  int64_t first_sample_ = 0;  // absolute number of samples_.front()
+  double median_interval_s_ = 0.0;
+  std::map<int64_t, RateGroup> groups_;  // by id, in time order
+  int64_t next_group_ = 0;
+  std::map<int64_t, Pair> pairs_;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_PAIR_GRAPH_H_
