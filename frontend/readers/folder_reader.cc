@@ -77,7 +77,7 @@ Status AddVideo(const CameraFiles& files, Recording* recording) {
   if (video->display_rotation_deg != 0) {
     recording->notes.push_back(
         Concat(files.video, ": is to be shown rotated by ", video->display_rotation_deg,
-               " deg; rows are read out as coded, so the picture is used without that rotation"));
+               " deg clockwise; rows are read out as coded, so it is used without that rotation"));
   }
   return SetResolution(video->width_px, video->height_px, files.video, files.yaml,
                        &recording->camera);

@@ -20,7 +20,7 @@ namespace camgyro {
 namespace {
 
 struct Payload {
-  double start_s = 0.0, duration_s = 0.0;
+  double start_s = 0.0;
   GpmfPayload gpmf;
 };
 
@@ -32,7 +32,7 @@ Result<std::vector<Payload>> ReadPayloads(const std::string& file, const VideoCo
       return BadInput(Concat(file, ": telemetry payload ", payloads.size(),
                              " is malformed: ", gpmf.error().message));
     }
-    payloads.push_back({packet.start_s, packet.duration_s, std::move(*gpmf)});
+    payloads.push_back({packet.start_s, std::move(*gpmf)});
   }
   return payloads;
 }
@@ -162,8 +162,7 @@ std::vector<double> CollectScalars(const std::vector<Payload>& payloads, const s
   return values;
 }
 
-void NoteGyroClock(const SensorSamples& gyro, const std::vector<Payload>& payloads,
-                   Recording* recording) {
+void NoteGyroClock(const SensorSamples& gyro, Recording* recording) {
   recording->notes.push_back(
       Concat("gyro clock: ", gyro.stamps_ns.size(), " samples of ", gyro.counts.size(),
              " telemetry payloads laid on one line of ", 1.0 / gyro.clock.interval_s,
@@ -179,15 +178,15 @@ void NoteGyroClock(const SensorSamples& gyro, const std::vector<Payload>& payloa
     if (std::abs(static_cast<double>(gyro.counts[i]) - usual) > 0.05 * usual) {
       recording->notes.push_back(Concat(
           "telemetry payload ", i, " has ", gyro.counts[i], " gyro samples, others ", usual,
-          ": its time is ambiguous by ",
+          ": when it starts is uncertain by about ",
           1e3 * gyro.clock.interval_s * std::abs(static_cast<double>(gyro.counts[i]) - usual),
-          " ms; the delay between camera and gyro takes this up"));
+          " ms"));
     }
   }
-  const double telemetry_end_s = payloads.back().start_s + payloads.back().duration_s;
+  const double gyro_end_s = SecondsSince(0, gyro.stamps_ns.back());
   const double video_end_s = SecondsSince(0, recording->frames.back().stamp_ns);
-  if (telemetry_end_s < video_end_s) {
-    recording->notes.push_back(Concat("telemetry ends at ", telemetry_end_s,
+  if (gyro_end_s < video_end_s) {
+    recording->notes.push_back(Concat("the gyro ends at ", gyro_end_s,
                                       " s, the video's last frame is at ", video_end_s, " s"));
   }
 }
@@ -272,7 +271,7 @@ Result<Recording> ReadGoPro(const std::string& file) {
       "GoPro ", model, view == settings.end() ? "" : ", field of view (VFOV) " + view->second,
       ", gyro axes ", gyro->orientation,
       gyro->orientation_stated ? " (ORIN)" : " (the model's; the file does not say)"));
-  NoteGyroClock(*gyro, *payloads, &recording);
+  NoteGyroClock(*gyro, &recording);
   SetExposures(CollectScalars(*payloads, "SHUT"), &recording);
   SetStabilisation(settings, &recording);
   std::vector<double> readouts_ms = CollectScalars(*payloads, "SROT");
@@ -284,7 +283,7 @@ Result<Recording> ReadGoPro(const std::string& file) {
   if (video->display_rotation_deg != 0) {
     recording.notes.push_back(Concat("the video is to be shown rotated by ",
                                      video->display_rotation_deg,
-                                     " deg; it is used without that rotation"));
+                                     " deg clockwise; it is used without that rotation"));
   }
   return recording;
 }

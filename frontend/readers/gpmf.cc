@@ -74,6 +74,12 @@ double Element(char type, const uint8_t* bytes) {
   }
 }
 
+// The first of several texts of equal length; one text may be written as many single characters.
+std::string FirstWord(const GpmfItem& item) {
+  const std::string text = item.Text();
+  return item.sample_size > 1 ? std::string(Trim(text.substr(0, item.sample_size))) : text;
+}
+
 // The samples of one STRM and what stands before them.
 Result<std::optional<GpmfStream>> ReadStream(ByteView bytes) {
   const auto items = ParseGpmf(bytes);
@@ -82,9 +88,7 @@ Result<std::optional<GpmfStream>> ReadStream(ByteView bytes) {
   std::vector<double> scale;
   for (const GpmfItem& item : *items) {
     if (item.key == "SCAL") scale = item.Numbers();
-    if (item.key == "SIUN" || item.key == "UNIT") {
-      stream.unit = Trim(item.Text().substr(0, item.sample_size));
-    }
+    if (item.key == "SIUN") stream.unit = FirstWord(item);
     if (item.key == "ORIN") stream.orientation = item.Text();
     const bool counter = item.key == "STMP" || item.key == "TSMP";
     const std::vector<double> numbers = counter ? item.Numbers() : std::vector<double>();

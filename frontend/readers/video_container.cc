@@ -22,7 +22,7 @@ int DisplayRotationDeg(const AVStream& stream) {
   const uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
   if (matrix == nullptr) return 0;
   const double angle_deg = av_display_rotation_get(reinterpret_cast<const int32_t*>(matrix));
-  return std::isfinite(angle_deg) ? static_cast<int>(std::lround(angle_deg)) : 0;
+  return std::isfinite(angle_deg) ? static_cast<int>(std::lround(-angle_deg)) : 0;
 }
 
 }  // namespace
@@ -59,7 +59,6 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
   int code = 0;
   while ((code = av_read_frame(context->get(), packet.get())) >= 0) {
     const AVStream& stream = *(*context)->streams[packet->stream_index];
-    const double unit_s = av_q2d(stream.time_base);
     if (packet->stream_index == video_index) {
       ++packets;
       cut_short = cut_short || (packet->flags & AV_PKT_FLAG_CORRUPT) != 0;
@@ -73,8 +72,7 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
             av_rescale_q(packet->pts, stream.time_base, AVRational{1, 1000000000}));
       }
     } else if (IsGpmf(stream) && packet->pts != AV_NOPTS_VALUE) {
-      result.gpmf.push_back({static_cast<double>(packet->pts) * unit_s,
-                             static_cast<double>(packet->duration) * unit_s,
+      result.gpmf.push_back({static_cast<double>(packet->pts) * av_q2d(stream.time_base),
                              {packet->data, packet->data + packet->size}});
     }
     av_packet_unref(packet.get());

@@ -12,13 +12,13 @@
 namespace camgyro {
 
 struct DataPacket {
-  double start_s = 0.0, duration_s = 0.0;  // from the container's time 0
+  double start_s = 0.0;  // from the container's time 0
   std::vector<uint8_t> bytes;
 };
 
 struct VideoContainer {
   int width_px = 0, height_px = 0;  // as coded; a rotation for display is not applied
-  int display_rotation_deg = 0;     // of the display matrix, counter-clockwise; 0 without one
+  int display_rotation_deg = 0;     // of the display matrix, clockwise; 0 without one
   std::vector<int64_t> stamps_ns;   // of the shown frames, from the container's time 0, increasing
   std::vector<DataPacket> gpmf;     // packets of a GoPro telemetry stream, in order
 };
