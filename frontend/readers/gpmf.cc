@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstring>
 
 #include "frontend/readers/text.h"
@@ -109,10 +110,11 @@ Result<std::optional<GpmfStream>> ReadStream(ByteView bytes) {
       return BadInput(
           Concat(item.key, " has ", scale.size(), " scales for ", stream.elements, " elements"));
     }
-    for (size_t i = 0; !scale.empty() && i < stream.values.size(); ++i) {
-      const double divisor = scale[scale.size() == 1 ? 0 : i % stream.elements];
-      if (divisor == 0.0) return BadInput(Concat(item.key, " has a scale of zero"));
-      stream.values[i] /= divisor;
+    for (size_t i = 0; i < stream.values.size(); ++i) {
+      if (!scale.empty()) stream.values[i] /= scale[scale.size() == 1 ? 0 : i % stream.elements];
+      if (!std::isfinite(stream.values[i])) {
+        return BadInput(Concat(item.key, " has a value that is not finite, or a scale of zero"));
+      }
     }
   }
   if (stream.key.empty()) return std::optional<GpmfStream>();
@@ -148,6 +150,8 @@ Result<std::vector<GpmfItem>> ParseGpmf(ByteView bytes) {
     item.repeat = BigEndian(header + 6, 2);
     item.value = {header + kHeaderSize, item.sample_size * item.repeat};
     if (item.value.size > bytes.size - at - kHeaderSize) {
+      std::replace_if(
+          item.key.begin(), item.key.end(), [](unsigned char c) { return !std::isprint(c); }, '?');
       return BadInput(Concat("item '", item.key, "' needs ", item.value.size, " bytes, only ",
                              bytes.size - at - kHeaderSize, " are left"));
     }

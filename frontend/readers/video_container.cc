@@ -28,7 +28,6 @@ int DisplayRotationDeg(const AVStream& stream) {
 }  // namespace
 
 Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file) {
-  // FFmpeg prints on its own otherwise (unknown streams of a GoPro file); errors are values here.
   av_log_set_level(AV_LOG_FATAL);
   AVFormatContext* context = nullptr;
   int code = avformat_open_input(&context, file.c_str(), nullptr, nullptr);

@@ -27,7 +27,8 @@ struct VideoContainer {
 // short (fewer packets than its index lists), frames without or with repeated stamps.
 Result<VideoContainer> ReadVideoContainer(const std::string& file);
 
-// Opens a file and finds its streams.
+// Opens a file and finds its streams. Lowers FFmpeg's log level to fatal, for the whole process:
+// errors are values here, and GoPro files have streams that it would print warnings about.
 Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file);
 
 }  // namespace camgyro

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include <fstream>
+#include <cmath>
 
 #include "frontend/readers/mp4_box.h"
 #include "frontend/readers/sample_clock.h"
@@ -94,9 +94,10 @@ TEST(Gpmf, EveryCutIsAnErrorOrAShorterLevel) {
   }
 }
 
-TEST(Gpmf, RefusesScalesThatDoNotFit) {
+TEST(Gpmf, RefusesScalesAndValuesThatDoNotFit) {
   for (const std::string& scale :
-       {GpmfShort("SCAL", 0), GpmfItemBytes("SCAL", 's', 2, 2, std::string("\0\1\0\1", 4))}) {
+       {GpmfShort("SCAL", 0), GpmfItemBytes("SCAL", 's', 2, 2, std::string("\0\1\0\1", 4)),
+        GpmfFloats("SCAL", {std::nanf("")})}) {
     const std::string bytes =
         GpmfNested("DEVC", GpmfNested("STRM", scale + GpmfTriples("GYRO", {1, 2, 3})));
     const auto payload = ReadGpmfPayload(View(bytes));

@@ -149,13 +149,15 @@ TEST(VideoReader, NamesTheFrameWhereVideoAndRecordingDisagree) {
 
 // One second of telemetry: 100 gyro samples, stored as y, -x, z; 25 exposures and readouts.
 std::string Telemetry(int payload, const std::string& unit = "rad/s",
-                      const std::string& orientation = "YxZ") {
+                      const std::string& orientation = "YxZ", int64_t stamp_us = -1) {
   std::vector<int16_t> samples;
   for (int i = 0; i < 100; ++i) {
     const auto value = static_cast<int16_t>(100 * payload + i);
     samples.insert(samples.end(), {200, static_cast<int16_t>(-value), 300});
   }
-  const std::string gyro = GpmfLong("TSMP", 100 * (payload + 1)) + GpmfText("SIUN", unit) +
+  const std::string stamp =
+      stamp_us < 0 ? "" : GpmfItemBytes("STMP", 'J', 8, 1, BigEndianBytes(stamp_us, 8));
+  const std::string gyro = stamp + GpmfLong("TSMP", 100 * (payload + 1)) + GpmfText("SIUN", unit) +
                            GpmfShort("SCAL", 1000) + GpmfText("ORIN", orientation) +
                            GpmfTriples("GYRO", samples);
   return GpmfNested("DEVC",
@@ -200,6 +202,22 @@ TEST(GoProReader, CountsSamplesOfAMissingPayload) {
   EXPECT_NEAR(static_cast<double>(recording->gyro[200].stamp_ns), 3e9, 1.0);  // after the gap
 }
 
+TEST(GoProReader, PrefersTheCamerasStampsToPayloadTimes) {
+  const RecordingFolder folder;
+  VideoSpec spec = Video(75);
+  // The camera's clock says 100 samples in 0.95 s, where payloads lie 1 s apart.
+  for (int i = 0; i < 3; ++i) {
+    spec.gpmf.emplace_back(Telemetry(i, "rad/s", "YxZ", 7000000 + 950000 * i), i);
+  }
+  ASSERT_TRUE(WriteVideo(folder.File("a.mp4"), spec));
+  const Result<Recording> recording = ReadRecording(folder.File("a.mp4"));
+  ASSERT_TRUE(recording) << recording.error().message;
+  ASSERT_EQ(recording->gyro.size(), 300u);
+  EXPECT_EQ(recording->gyro[0].stamp_ns, 0);
+  EXPECT_NEAR(static_cast<double>(recording->gyro[200].stamp_ns), 1.9e9, 1.0);
+  EXPECT_THAT(recording->notes, Contains(HasSubstr("the gyro ends at 2.8405 s")));
+}
+
 TEST(GoProReader, RefusesWhatItCannotUse) {
   const std::string exposures_only =
       GpmfNested("DEVC", GpmfNested("STRM", GpmfFloats("SHUT", {0.004f})));
@@ -219,6 +237,7 @@ TEST(GoProReader, RefusesWhatItCannotUse) {
        "GYRO: ORIN 'YXZ' is no right-handed order"},
       {{{Telemetry(0), 0}}, "GYRO: a clock needs at least two telemetry payloads"},
       {{{Telemetry(1), 0}, {Telemetry(0), 1}}, "GYRO: sample counts (TSMP) go back"},
+      {{{Telemetry(0), 0}, {Telemetry(20000000), 1}}, "GYRO: a rate of 2e+09 Hz is not plausible"},
   };
   for (const Case& c : cases) {
     SCOPED_TRACE(c.complaint);
