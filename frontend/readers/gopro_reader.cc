@@ -60,9 +60,9 @@ Settings ReadSettings(const std::string& file) {
     for (const GpmfItem& item : *items) {
       if (item.type == 0) levels.push_back(item.value);
       if (item.type == 'c') settings.texts.emplace(item.key, item.Text());
-      if (item.key == "SROT" && !item.Numbers().empty()) {
-        settings.readout_ms = item.Numbers().front();
-      }
+      const std::vector<double> numbers =
+          item.key == "SROT" ? item.Numbers() : std::vector<double>();
+      if (!numbers.empty() && std::isfinite(numbers[0])) settings.readout_ms = numbers[0];
     }
   }
   return settings;

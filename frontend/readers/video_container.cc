@@ -52,8 +52,10 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
   result.height_px = video.codecpar->height;
   result.display_rotation_deg = DisplayRotationDeg(video);
 
+  // Not nb_frames, which counts what an edit list leaves out, too.
+  const int listed = avformat_index_get_entries_count(&video);
   FfmpegPtr<AVPacket> packet(av_packet_alloc());
-  int64_t packets = 0;
+  int packets = 0;
   bool cut_short = false;
   int code = 0;
   while ((code = av_read_frame(context->get(), packet.get())) >= 0) {
@@ -80,9 +82,9 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
     return BadInput(
         Concat(file, ": reading stopped after ", packets, " frames (", FfmpegError(code), ")"));
   }
-  if (cut_short || packets < video.nb_frames) {
-    return BadInput(Concat(file, ": the file is cut short: its index lists ", video.nb_frames,
-                           " frames, ", packets, " were found whole"));
+  if (cut_short || packets < listed) {
+    return BadInput(Concat(file, ": the file is cut short: its index lists ", listed, " frames, ",
+                           packets, " were found whole"));
   }
   std::sort(result.stamps_ns.begin(), result.stamps_ns.end());  // packets come in coding order
   const auto repeated = std::adjacent_find(result.stamps_ns.begin(), result.stamps_ns.end());

@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
@@ -189,6 +192,49 @@ TEST(GoProReader, ReadsVideoAndTelemetry) {
   EXPECT_THAT(recording->notes, Contains(HasSubstr("one line of 100 Hz")));
   Result<bool> end;
   EXPECT_EQ(CountFrames(*recording, &end), 75);
+}
+
+// Puts a GPMF box of settings behind what stands in moov/udta, the last boxes that WriteVideo's
+// muxer writes.
+void AppendSettings(const std::string& file, const std::string& settings) {
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const std::string box = BigEndianBytes(8 + settings.size(), 4) + "GPMF" + settings;
+  for (const char* name : {"moov", "udta"}) {
+    const size_t at = bytes.rfind(name);
+    ASSERT_NE(at, std::string::npos);
+    bytes.replace(at - 4, 4, BigEndianBytes(bytes.size() - (at - 4) + box.size(), 4));
+  }
+  std::ofstream(file, std::ios::binary) << bytes << box;
+}
+
+TEST(GoProReader, ReadsTheSettingsBesideTheTracks) {
+  struct Case {
+    std::string items;
+    std::optional<std::string> stabilisation;
+  };
+  const Case cases[] = {
+      {GpmfText("EISE", "Y") + GpmfText("EISA", "HS Boost"), "EISE=Y, EISA=HS Boost"},
+      {GpmfText("EISE", "Y"), "EISE=Y"},
+      {GpmfText("EISE", "N") + GpmfText("EISA", "N/A"), std::nullopt},
+      {GpmfText("EISA", "HS EIS"), "EISA=HS EIS"},
+      {GpmfText("EISA", "N/A"), std::nullopt},
+  };
+  const RecordingFolder folder;
+  const std::string file = folder.File("a.mp4");
+  for (const Case& c : cases) {
+    VideoSpec spec = Video(50);
+    for (int i = 0; i < 2; ++i) spec.gpmf.emplace_back(Telemetry(i), i);
+    ASSERT_TRUE(WriteVideo(file, spec));
+    AppendSettings(file, GpmfNested("DEVC", GpmfText("DVNM", "Global Settings") +
+                                                GpmfText("MINF", "HERO9 Black") +
+                                                GpmfFloats("SROT", {11.25f}) + c.items));
+    const Result<Recording> recording = ReadRecording(file);
+    ASSERT_TRUE(recording) << recording.error().message;
+    EXPECT_EQ(recording->declared_stabilisation, c.stabilisation);
+    EXPECT_DOUBLE_EQ(recording->camera.readout_s.value(), 0.01125);  // not the telemetry's
+    EXPECT_THAT(recording->notes, Contains(HasSubstr("GoPro HERO9 Black")));
+  }
 }
 
 TEST(GoProReader, CountsSamplesOfAMissingPayload) {
