@@ -45,6 +45,9 @@ class SimulatedCamera {
   // Focal length of the rows at a time [px].
   double Focal(double time_s) const;
 
+  // Optical stabilisation: where the principal point is, from where it would be without [px].
+  Eigen::Vector2d StabiliserShift(double time_s) const;
+
   struct Observation {
     Eigen::Vector2d sensor_px;
     double time_s = 0.0;   // exposure of that pixel
@@ -69,7 +72,6 @@ class SimulatedCamera {
 
  private:
   LensParameters LensAt(double time_s) const;
-  Eigen::Vector2d StabiliserShift(double time_s) const;  // optical [px]
   Eigen::Matrix3d SmoothedOrientation(double time_s) const;
   Eigen::Matrix3d Correction(const FrameTiming& frame, double time_s) const;
 

@@ -1,0 +1,43 @@
+#include "tools/simulate_command.h"
+
+#include <cstdio>
+
+#include "tools/simulation/simulate.h"
+#include "tools/simulation/write_recording.h"
+
+namespace camgyro {
+
+using simulation::Scenario;
+using simulation::Simulated;
+using simulation::VideoFormat;
+
+Status RunSimulate(const std::string& scenario_path, const std::string& out_dir,
+                   const std::vector<std::string>& overrides) {
+  const Result<Scenario> scenario = simulation::LoadScenario(scenario_path, overrides);
+  if (!scenario) return tl::unexpected(scenario.error());
+  const bool video = scenario->video.format != VideoFormat::kNone;
+  const Result<Simulated> simulated =
+      video ? simulation::SimulateSensors(*scenario) : simulation::SimulateTracks(*scenario);
+  if (!simulated) {
+    Error error = simulated.error();
+    error.message = scenario_path + ": " + error.message;
+    return tl::unexpected(error);
+  }
+  const auto progress = [](size_t done, size_t all) {
+    if (done % 30 == 0 || done == all)
+      std::fprintf(stderr, "\rrendered %zu of %zu frames", done, all);
+    if (done == all) std::fprintf(stderr, "\n");
+  };
+  Status status = simulation::WriteRecording(*simulated, *scenario, out_dir, progress);
+  if (!status) return status;
+  std::string effects;
+  for (const std::string& name : simulation::ActiveEffects(scenario->effects)) {
+    effects += (effects.empty() ? "" : ", ") + name;
+  }
+  std::printf("%s: %zu frames%s, %zu gyro samples, effects: %s\n", out_dir.c_str(),
+              simulated->recording.frames.size(), video ? " rendered" : "",
+              simulated->recording.gyro.size(), effects.empty() ? "none" : effects.c_str());
+  return {};
+}
+
+}  // namespace camgyro
