@@ -1,4 +1,4 @@
-// Where measured recordings are. They are not part of the repository.
+// Where the measured recordings lie, which are no part of the repository.
 #ifndef CAMGYRO_TESTS_MEASURED_DATA_H_
 #define CAMGYRO_TESTS_MEASURED_DATA_H_
 
@@ -9,15 +9,13 @@
 
 namespace camgyro {
 
-// Path of a recording in $CAMGYRO_DATA, or in ../shared/data beside the source tree.
+// The path of a recording under $CAMGYRO_DATA (default: ../shared/data beside the source), or
+// nothing if it is not there: the test then says GTEST_SKIP().
 inline std::optional<std::string> MeasuredData(const std::string& name) {
-  const char* folder = std::getenv("CAMGYRO_DATA");
+  const char* root = std::getenv("CAMGYRO_DATA");
   const std::filesystem::path path =
-      (folder ? std::filesystem::path(folder)
-              : std::filesystem::path(CAMGYRO_SOURCE_DIR) / ".." / "shared" / "data") /
-      name;
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) return std::nullopt;
+      std::filesystem::path(root ? root : CAMGYRO_SOURCE_DIR "/../shared/data") / name;
+  if (!std::filesystem::exists(path)) return std::nullopt;
   return path.string();
 }
 

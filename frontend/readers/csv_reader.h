@@ -1,0 +1,63 @@
+// Rows of a comma-separated file, with complaints that name file, line, column and expectation.
+#ifndef CAMGYRO_FRONTEND_READERS_CSV_READER_H_
+#define CAMGYRO_FRONTEND_READERS_CSV_READER_H_
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+
+namespace camgyro {
+
+// Reads a whole file and hands out its rows. The first error sticks: NextRow() is false from then
+// on, and status() says what was wrong; cells read after an error are zero.
+//
+//   CsvReader csv(file, {"timestamp [ns]", "u [px]", "v [px]"}, {3});
+//   while (csv.NextRow()) points.push_back({csv.Stamp(0), csv.Number(1), csv.Number(2)});
+//   if (!csv.status()) return tl::unexpected(csv.status().error());
+//
+// Tolerated: a byte order mark, CRLF, blanks around cells, empty lines, lines that begin with '#',
+// and a first line without '#' in which no cell is a number (a header).
+class CsvReader {
+ public:
+  // columns: names for messages, in order. widths: how many of them a row may have (e.g. {4, 7});
+  // all rows of a file have the width of its first row.
+  CsvReader(const std::string& file, std::vector<std::string> columns, std::vector<size_t> widths);
+
+  // Cell names of the header (without '#'); empty without one. Known before the first NextRow().
+  const std::vector<std::string>& header() const { return header_; }
+
+  bool NextRow();
+  size_t width() const { return cells_.size(); }
+  int line() const { return line_; }  // of the current row, from 1
+
+  std::string_view Cell(size_t column) const { return cells_[column]; }
+  int64_t Stamp(size_t column) { return Integer(column, "an integer number of nanoseconds"); }
+  int64_t Integer(size_t column, const char* expected = "an integer");
+  double Number(size_t column);  // finite
+
+  // Records an error of the current row; the file and the line are put in front.
+  void Fail(const std::string& message);
+  const Status& status() const { return status_; }
+
+ private:
+  bool NextLine(std::string_view* text);
+  void FailCell(size_t column, const std::string& expected);
+
+  std::string file_;
+  std::vector<std::string> columns_;
+  std::vector<size_t> widths_;
+  std::string content_;
+  size_t position_ = 0;
+  int line_ = 0;
+  size_t file_width_ = 0;  // of the first row; 0 before it
+  std::vector<std::string> header_;
+  std::vector<std::string_view> cells_;
+  Status status_;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FRONTEND_READERS_CSV_READER_H_

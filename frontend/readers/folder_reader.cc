@@ -1,0 +1,207 @@
+#include "frontend/readers/folder_reader.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "frontend/readers/camera_csv.h"
+#include "frontend/readers/image_file.h"
+#include "frontend/readers/imu_csv.h"
+#include "frontend/readers/sensor_yaml.h"
+#include "frontend/readers/text.h"
+#include "frontend/readers/video_container.h"
+
+namespace camgyro {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The files of cam0/ that exist; empty names for those that do not.
+struct CameraFiles {
+  std::string data, images, video, tracks, matches, attitude, yaml;
+};
+
+CameraFiles FindCameraFiles(const fs::path& cam) {
+  const auto existing = [&](const char* name) {
+    return fs::exists(cam / name) ? (cam / name).string() : std::string();
+  };
+  return {existing("data.csv"),          (cam / "data").string(), existing("video.mp4"),
+          existing("tracks.csv"),        existing("matches.csv"), existing("attitude.csv"),
+          (cam / "sensor.yaml").string()};
+}
+
+// Takes the size that the pictures have, or refuses if sensor.yaml says another.
+Status SetResolution(int width_px, int height_px, const std::string& file,
+                     const std::string& yaml_file, CameraGuess* camera) {
+  if (camera->width_px != 0 && (camera->width_px != width_px || camera->height_px != height_px)) {
+    return BadInput(Concat(file, ": the picture has ", width_px, " x ", height_px, " pixels, but ",
+                           yaml_file, " says resolution [", camera->width_px, ", ",
+                           camera->height_px, "]; expected the same"));
+  }
+  camera->width_px = width_px;
+  camera->height_px = height_px;
+  return {};
+}
+
+Status AddImages(const CameraFiles& files, const FrameTable& table, Recording* recording) {
+  for (size_t i = 0; i < table.frames.size(); ++i) {
+    const std::string image = (fs::path(files.images) / table.frames[i].image_file).string();
+    if (!fs::is_regular_file(image)) {
+      return BadInput(Concat(files.data, ":", table.lines[i], ": ", image,
+                             " does not exist, expected an image"));
+    }
+    recording->frames[i].image_file = image;
+  }
+  const std::string& first = recording->frames.front().image_file;
+  const Result<cv::Mat> image = ReadGrayImage(first);
+  if (!image) return tl::unexpected(image.error());
+  return SetResolution(image->cols, image->rows, first, files.yaml, &recording->camera);
+}
+
+Status AddVideo(const CameraFiles& files, Recording* recording) {
+  const Result<VideoContainer> video = ReadVideoContainer(files.video);
+  if (!video) return tl::unexpected(video.error());
+  if (recording->frames.empty()) {
+    for (const int64_t stamp_ns : video->stamps_ns) {
+      recording->frames.emplace_back().stamp_ns = stamp_ns;
+    }
+    recording->notes.push_back(
+        Concat(files.video, ": frame stamps are the container's, as there is no cam0/data.csv"));
+  } else if (recording->frames.size() != video->stamps_ns.size()) {
+    return BadInput(Concat(files.data, ": has ", recording->frames.size(), " frames, but ",
+                           files.video, " has ", video->stamps_ns.size(),
+                           "; expected the same number"));
+  }
+  recording->video_file = files.video;
+  if (video->display_rotation_deg != 0) {
+    recording->notes.push_back(
+        Concat(files.video, ": is to be shown rotated by ", video->display_rotation_deg,
+               " deg; rows are read out as coded, so the picture is used without that rotation"));
+  }
+  return SetResolution(video->width_px, video->height_px, files.video, files.yaml,
+                       &recording->camera);
+}
+
+// Frames for tracks, matches or attitudes that come without cam0/data.csv.
+Status AddFramesOfTables(const CameraFiles& files, Recording* recording) {
+  std::vector<int64_t> stamps;
+  const auto merge = [&](const Result<std::vector<int64_t>>& more) -> Status {
+    if (!more) return tl::unexpected(more.error());
+    stamps.insert(stamps.end(), more->begin(), more->end());
+    return {};
+  };
+  Status status;
+  if (!files.tracks.empty()) status = merge(ReadTrackStamps(files.tracks));
+  if (status && !files.matches.empty()) status = merge(ReadMatchStamps(files.matches));
+  if (status && !files.attitude.empty()) status = merge(ReadAttitudeStamps(files.attitude));
+  if (!status) return status;
+  std::sort(stamps.begin(), stamps.end());
+  stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
+  for (const int64_t stamp_ns : stamps) recording->frames.emplace_back().stamp_ns = stamp_ns;
+  return {};
+}
+
+Status ReadCamera(const fs::path& cam, Recording* recording) {
+  const CameraFiles files = FindCameraFiles(cam);
+  const Result<SensorYaml> yaml = ReadSensorYaml(files.yaml);
+  if (!yaml) return tl::unexpected(yaml.error());
+  recording->camera = yaml->camera;
+  recording->camera.q_gyro_cam = yaml->q_body_sensor;  // the IMU's own T_BS is applied later
+
+  FrameTable table;
+  if (!files.data.empty()) {
+    Result<FrameTable> read = ReadFrameTable(files.data);
+    if (!read) return tl::unexpected(read.error());
+    table = std::move(*read);
+    recording->frames = table.frames;
+    if (table.frames.size() < 2) {
+      return BadInput(
+          Concat(files.data, ": has ", table.frames.size(), " frames, expected at least two"));
+    }
+  }
+  const bool has_images = !table.frames.empty() && !table.frames.front().image_file.empty();
+  const bool has_tables =
+      !files.tracks.empty() || !files.matches.empty() || !files.attitude.empty();
+  if (has_images) {
+    if (Status status = AddImages(files, table, recording); !status) return status;
+  } else if (!files.video.empty()) {
+    if (Status status = AddVideo(files, recording); !status) return status;
+  } else if (!has_tables) {
+    return BadInput(Concat(cam.string(),
+                           ": nothing to calibrate with; expected file names in data.csv and the "
+                           "images in data/, or video.mp4, tracks.csv, matches.csv, attitude.csv"));
+  } else if (table.frames.empty()) {
+    if (Status status = AddFramesOfTables(files, recording); !status) return status;
+  }
+  if (recording->frames.size() < 2) {
+    return BadInput(
+        Concat(cam.string(), ": has ", recording->frames.size(), " frames, expected at least two"));
+  }
+  if (MedianInterval(recording->frames) < 1e-5) {
+    return BadInput(Concat(cam.string(), ": the median interval of frame stamps is ",
+                           MedianInterval(recording->frames) * 1e9,
+                           " ns, too short for any camera; expected stamps in nanoseconds"));
+  }
+  if (recording->camera.width_px == 0 && (!files.tracks.empty() || !files.matches.empty())) {
+    return BadInput(Concat(files.tracks.empty() ? files.matches : files.tracks,
+                           ": the size of the pictures is needed to read pixels as rows in time; "
+                           "expected `resolution: [width, height]` in ",
+                           files.yaml));
+  }
+
+  Status status;
+  if (!files.tracks.empty()) status = ReadTracks(files.tracks, recording);
+  if (status && !files.matches.empty()) status = ReadMatches(files.matches, recording);
+  if (status && !files.attitude.empty()) status = ReadAttitudes(files.attitude, recording);
+  return status;
+}
+
+Status ReadImu(const fs::path& imu, Recording* recording) {
+  const Result<SensorYaml> yaml = ReadSensorYaml((imu / "sensor.yaml").string());
+  if (!yaml) return tl::unexpected(yaml.error());
+  recording->gyro_info = yaml->gyro;
+  if (recording->camera.q_gyro_cam && yaml->q_body_sensor) {
+    recording->camera.q_gyro_cam = yaml->q_body_sensor->conjugate() * *recording->camera.q_gyro_cam;
+  }
+  return ReadImuCsv((imu / "data.csv").string(), recording);
+}
+
+// A note if the stamps do not overlap: clocks may have different origins, which the delay search
+// has to bridge.
+void NoteClocks(Recording* recording) {
+  const int64_t cam_first = recording->frames.front().stamp_ns;
+  const int64_t cam_last = recording->frames.back().stamp_ns;
+  const int64_t gyro_first = recording->gyro.front().stamp_ns;
+  const int64_t gyro_last = recording->gyro.back().stamp_ns;
+  if (cam_first <= gyro_last && gyro_first <= cam_last) return;
+  recording->notes.push_back(Concat("camera and gyro clocks do not overlap: frames from ",
+                                    cam_first, " to ", cam_last, " ns, gyro from ", gyro_first,
+                                    " to ", gyro_last, " ns"));
+}
+
+}  // namespace
+
+Result<Recording> ReadFolder(const std::string& folder) {
+  const fs::path root =
+      fs::is_directory(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
+  for (const char* part : {"cam0", "imu0"}) {
+    if (!fs::is_directory(root / part)) {
+      return BadInput(Concat(folder, ": has no folder ", part,
+                             "/; expected a recording with cam0/ and imu0/ (docs/"
+                             "recording_format.md), or the path of a GoPro MP4 file"));
+    }
+  }
+  Recording recording;
+  recording.path = folder;
+  if (Status status = ReadCamera(root / "cam0", &recording); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (Status status = ReadImu(root / "imu0", &recording); !status) {
+    return tl::unexpected(status.error());
+  }
+  NoteClocks(&recording);
+  return recording;
+}
+
+}  // namespace camgyro

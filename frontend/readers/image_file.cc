@@ -1,0 +1,59 @@
+#include "frontend/readers/image_file.h"
+
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "frontend/readers/text.h"
+
+namespace camgyro {
+namespace {
+
+bool IsJpeg(const std::vector<uint8_t>& bytes) {
+  return bytes.size() > 2 && bytes[0] == 0xFF && bytes[1] == 0xD8;
+}
+
+// Walks the segments of a JPEG (ITU T.81, annex B) up to its end marker; thumbnails, which have
+// an end marker of their own, are inside of segments that are skipped.
+bool JpegIsWhole(const std::vector<uint8_t>& bytes) {
+  size_t at = 2;
+  while (at + 1 < bytes.size()) {
+    const uint8_t marker = bytes[at + 1];
+    // Not a marker, a stuffed 0xFF of coded data, a fill byte, a restart.
+    if (bytes[at] != 0xFF || marker == 0x00 || marker == 0xFF ||
+        (marker >= 0xD0 && marker <= 0xD7)) {
+      ++at;
+    } else if (marker == 0xD9) {
+      return true;
+    } else if (at + 3 < bytes.size()) {
+      at += 2u + 256u * bytes[at + 2] + bytes[at + 3];
+    } else {
+      return false;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+Result<cv::Mat> ReadGrayImage(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(in)),
+                                   std::istreambuf_iterator<char>());
+  if (!in || bytes.empty()) return BadInput(Concat(file, ": cannot be read, expected an image"));
+  if (IsJpeg(bytes) && !JpegIsWhole(bytes)) {
+    return BadInput(Concat(file, ": the JPEG is cut short, expected a whole image"));
+  }
+  try {
+    cv::Mat gray = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    if (!gray.empty()) return gray;
+  } catch (const cv::Exception&) {
+    // Answered like an empty picture; OpenCV's text names its own source lines.
+  }
+  return BadInput(Concat(file, ": cannot be decoded, expected a whole image"));
+}
+
+}  // namespace camgyro

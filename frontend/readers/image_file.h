@@ -1,0 +1,19 @@
+// One image of a recording as grey values.
+#ifndef CAMGYRO_FRONTEND_READERS_IMAGE_FILE_H_
+#define CAMGYRO_FRONTEND_READERS_IMAGE_FILE_H_
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "core/result.h"
+
+namespace camgyro {
+
+// Decodes an image as 8-bit grey, as stored (an EXIF rotation is not applied: rows are time).
+// An image that cannot be decoded, or is cut short, is an error. OpenCV alone fills up the missing
+// part of a half-written JPEG with grey and reports success.
+Result<cv::Mat> ReadGrayImage(const std::string& file);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FRONTEND_READERS_IMAGE_FILE_H_

@@ -1,0 +1,24 @@
+// imu0/data.csv: #timestamp [ns],w_x,w_y,w_z [rad s^-1][,a_x,a_y,a_z [m s^-2]]
+#ifndef CAMGYRO_FRONTEND_READERS_IMU_CSV_H_
+#define CAMGYRO_FRONTEND_READERS_IMU_CSV_H_
+
+#include <string>
+
+#include "core/recording.h"
+#include "core/result.h"
+
+namespace camgyro {
+
+// Fills gyro, accel and notes of the recording. Rates are converted to rad/s if the header says
+// deg; rows that repeat the one before them exactly are dropped; both are noted. Refused: rates
+// that no gyro can have measured in rad/s, stamps that repeat with other values or go back, fewer
+// than two samples, stamps that cannot be nanoseconds.
+Status ReadImuCsv(const std::string& file, Recording* recording);
+
+// Error if the 99th percentile of |w| is beyond the full scale of gyros, 2000 deg/s: the rates are
+// in deg/s then. Slow motion in deg/s passes; only the camera can tell there.
+Status CheckRateUnit(const std::string& file, const std::vector<GyroSample>& gyro);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FRONTEND_READERS_IMU_CSV_H_

@@ -1,0 +1,197 @@
+#include "frontend/readers/sensor_yaml.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include "frontend/readers/text.h"
+
+namespace camgyro {
+namespace {
+
+// Typed look-ups in one file. The first error sticks, as in CsvReader.
+class Keys {
+ public:
+  Keys(std::string file, YAML::Node root) : file_(std::move(file)), root_(std::move(root)) {}
+
+  const Status& status() const { return status_; }
+
+  void Fail(const std::string& key, const std::string& message) {
+    if (!status_) return;
+    const YAML::Node node = root_[key];
+    const std::string line = node && node.Mark().line >= 0 ? Concat(":", node.Mark().line + 1) : "";
+    status_ = BadInput(Concat(file_, line, ": ", key, ": ", message));
+  }
+
+  std::optional<std::string> Text(const std::string& key) {
+    const YAML::Node node = root_[key];
+    if (!node || node.IsNull()) return std::nullopt;
+    if (!node.IsScalar()) {
+      Fail(key, "expected a word");
+      return std::nullopt;
+    }
+    return node.Scalar();
+  }
+
+  std::optional<double> Number(const std::string& key) {
+    const YAML::Node node = root_[key];
+    if (!node || node.IsNull()) return std::nullopt;
+    double value = 0.0;
+    if (!node.IsScalar() || !ParseNumber(std::string_view(node.Scalar()), &value) ||
+        !std::isfinite(value)) {
+      Fail(key, Concat("'", node.IsScalar() ? node.Scalar() : "a list or map",
+                       "' was found, expected a finite number"));
+      return std::nullopt;
+    }
+    return value;
+  }
+
+  std::optional<double> PositiveNumber(const std::string& key) {
+    const std::optional<double> value = Number(key);
+    if (value && *value <= 0.0) Fail(key, Concat(*value, " was found, expected more than zero"));
+    return value;
+  }
+
+  // The numbers of a list, or of the `data` of a matrix.
+  std::optional<std::vector<double>> Numbers(const std::string& key, const std::string& expected) {
+    YAML::Node node = root_[key];
+    if (!node || node.IsNull()) return std::nullopt;
+    if (node.IsMap()) node.reset(node["data"]);
+    std::vector<double> values;
+    bool good = node && node.IsSequence();
+    for (size_t i = 0; good && i < node.size(); ++i) {
+      double value = 0.0;
+      good = node[i].IsScalar() && ParseNumber(std::string_view(node[i].Scalar()), &value) &&
+             std::isfinite(value);
+      values.push_back(value);
+    }
+    if (good) return values;
+    Fail(key, "expected " + expected);
+    return std::nullopt;
+  }
+
+ private:
+  std::string file_;
+  const YAML::Node root_;
+  Status status_;
+};
+
+void ReadResolution(Keys* keys, CameraGuess* camera) {
+  const char* expected = "[width, height], two whole numbers of pixels above zero";
+  const auto size = keys->Numbers("resolution", expected);
+  if (!size) return;
+  const auto whole = [](double v) { return v >= 1.0 && v <= 65536.0 && v == std::floor(v); };
+  if (size->size() != 2 || !whole((*size)[0]) || !whole((*size)[1])) {
+    keys->Fail("resolution", Concat("expected ", expected));
+    return;
+  }
+  camera->width_px = static_cast<int>((*size)[0]);
+  camera->height_px = static_cast<int>((*size)[1]);
+}
+
+void ReadIntrinsics(Keys* keys, CameraGuess* camera) {
+  const auto model = keys->Text("camera_model");
+  if (model && *model != "pinhole") {
+    keys->Fail("camera_model", Concat("'", *model, "' is not supported, expected pinhole"));
+  }
+  const char* expected = "[fu, fv, cu, cv], four numbers [px] with fu and fv above zero";
+  const auto values = keys->Numbers("intrinsics", expected);
+  if (!values) return;
+  if (values->size() != 4 || (*values)[0] <= 0.0 || (*values)[1] <= 0.0) {
+    keys->Fail("intrinsics", Concat("expected ", expected));
+    return;
+  }
+  camera->focal_px = (*values)[1];
+  camera->aspect_ratio = (*values)[0] / (*values)[1];
+  camera->principal_px = Eigen::Vector2d((*values)[2], (*values)[3]);
+}
+
+void ReadDistortion(Keys* keys, CameraGuess* camera) {
+  const std::string model = keys->Text("distortion_model").value_or("");
+  const auto values = keys->Numbers("distortion_coefficients", "a list of numbers");
+  if (model.empty() || model == "none") {
+    if (values && !values->empty()) {
+      keys->Fail("distortion_coefficients",
+                 "are given, but distortion_model is missing or none; expected it to be "
+                 "radial-tangential (k1, k2, p1, p2)");
+    }
+    return;
+  }
+  if (model != "radial-tangential" && model != "radtan" && model != "plumb_bob") {
+    keys->Fail("distortion_model", Concat("'", model,
+                                          "' is not supported, expected none, or radial-tangential "
+                                          "(= radtan = plumb_bob: k1, k2, p1, p2)"));
+    return;
+  }
+  // plumb_bob has k3 behind the four; ours has not.
+  if (!values || values->size() < 4 || values->size() > 5 ||
+      (values->size() == 5 && values->back() != 0.0)) {
+    keys->Fail(values ? "distortion_coefficients" : "distortion_model",
+               "expected distortion_coefficients: [k1, k2, p1, p2] (a fifth, k3, must be zero)");
+    return;
+  }
+  camera->distortion_model = DistortionModel::kRadTan;
+  camera->distortion.assign(values->begin(), values->begin() + 4);
+}
+
+std::optional<Eigen::Quaterniond> ReadRotation(Keys* keys) {
+  const char* expected = "a map with `data`, the 16 numbers of a 4x4 matrix, row by row";
+  const auto values = keys->Numbers("T_BS", expected);
+  if (!values) return std::nullopt;
+  if (values->size() != 16) {
+    keys->Fail("T_BS", Concat(values->size(), " numbers were found, expected ", expected));
+    return std::nullopt;
+  }
+  const Eigen::Matrix3d R =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values->data())
+          .topLeftCorner<3, 3>();
+  // Files print six digits or more; an entry that is off by 1e-3 was mistyped.
+  if (!(R.transpose() * R).isIdentity(1e-3) || R.determinant() < 0.0) {
+    keys->Fail("T_BS",
+               "its upper left 3x3 block is not a rotation, expected an orthonormal, right-handed "
+               "one (sensor -> body)");
+    return std::nullopt;
+  }
+  return Eigen::Quaterniond(R).normalized();
+}
+
+}  // namespace
+
+Result<SensorYaml> ReadSensorYaml(const std::string& file) {
+  SensorYaml result;
+  if (!std::filesystem::exists(file)) return result;
+  std::ifstream in(file, std::ios::binary);
+  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  if (!in) return BadInput(Concat(file, ": cannot be read"));
+  // OpenCV writes "%YAML:1.0", which is not YAML; a comment in its place keeps the line numbers.
+  if (text.compare(0, 6, "%YAML:") == 0) text[0] = '#';
+
+  try {
+    const YAML::Node root = YAML::Load(text);
+    if (root.IsNull()) return result;
+    if (!root.IsMap()) return BadInput(Concat(file, ":1: expected lines of `key: value`"));
+    Keys keys(file, root);
+    ReadResolution(&keys, &result.camera);
+    ReadIntrinsics(&keys, &result.camera);
+    ReadDistortion(&keys, &result.camera);
+    result.q_body_sensor = ReadRotation(&keys);
+    result.camera.readout_s = keys.Number("readout_time");
+    result.camera.delay_s = keys.Number("timeshift_cam_imu");
+    if (result.camera.readout_s && std::abs(*result.camera.readout_s) > 1.0) {
+      keys.Fail("readout_time", Concat(*result.camera.readout_s,
+                                       " s was found, expected seconds per picture, e.g. 0.025"));
+    }
+    result.rate_hz = keys.PositiveNumber("rate_hz");
+    result.gyro.noise_density_rad_s_rtHz = keys.PositiveNumber("gyroscope_noise_density");
+    result.gyro.random_walk_rad_s2_rtHz = keys.PositiveNumber("gyroscope_random_walk");
+    if (!keys.status()) return tl::unexpected(keys.status().error());
+  } catch (const YAML::Exception& error) {
+    return BadInput(Concat(file, ":", error.mark.line + 1, ": not valid YAML: ", error.msg));
+  }
+  return result;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,98 @@
+#include "frontend/readers/video_container.h"
+
+extern "C" {
+#include <libavutil/display.h>
+#include <libavutil/log.h>
+}
+
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/readers/text.h"
+
+namespace camgyro {
+namespace {
+
+bool IsGpmf(const AVStream& stream) {
+  return stream.codecpar->codec_type == AVMEDIA_TYPE_DATA &&
+         stream.codecpar->codec_tag == MKTAG('g', 'p', 'm', 'd');
+}
+
+int DisplayRotationDeg(const AVStream& stream) {
+  const uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  if (matrix == nullptr) return 0;
+  const double angle_deg = av_display_rotation_get(reinterpret_cast<const int32_t*>(matrix));
+  return std::isfinite(angle_deg) ? static_cast<int>(std::lround(angle_deg)) : 0;
+}
+
+}  // namespace
+
+Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file) {
+  // FFmpeg prints on its own otherwise (unknown streams of a GoPro file); errors are values here.
+  av_log_set_level(AV_LOG_FATAL);
+  AVFormatContext* context = nullptr;
+  int code = avformat_open_input(&context, file.c_str(), nullptr, nullptr);
+  FfmpegPtr<AVFormatContext> owner(context);  // null after an error
+  if (code >= 0) code = avformat_find_stream_info(context, nullptr);
+  if (code < 0) {
+    return BadInput(Concat(file, ": cannot be read as a video (", FfmpegError(code), ")"));
+  }
+  return owner;
+}
+
+Result<VideoContainer> ReadVideoContainer(const std::string& file) {
+  auto context = OpenContainer(file);
+  if (!context) return tl::unexpected(context.error());
+  const int video_index =
+      av_find_best_stream(context->get(), AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+  if (video_index < 0) return BadInput(Concat(file, ": has no video stream"));
+  const AVStream& video = *(*context)->streams[video_index];
+
+  VideoContainer result;
+  result.width_px = video.codecpar->width;
+  result.height_px = video.codecpar->height;
+  result.display_rotation_deg = DisplayRotationDeg(video);
+
+  FfmpegPtr<AVPacket> packet(av_packet_alloc());
+  int64_t packets = 0;
+  bool cut_short = false;
+  int code = 0;
+  while ((code = av_read_frame(context->get(), packet.get())) >= 0) {
+    const AVStream& stream = *(*context)->streams[packet->stream_index];
+    const double unit_s = av_q2d(stream.time_base);
+    if (packet->stream_index == video_index) {
+      ++packets;
+      cut_short = cut_short || (packet->flags & AV_PKT_FLAG_CORRUPT) != 0;
+      if (packet->pts == AV_NOPTS_VALUE) {
+        return BadInput(Concat(file, ": frame ", packets - 1,
+                               " of the video has no time stamp; "
+                               "give the stamps in cam0/data.csv and a file that has them all"));
+      }
+      if ((packet->flags & AV_PKT_FLAG_DISCARD) == 0) {  // outside of the edit list: never shown
+        result.stamps_ns.push_back(
+            av_rescale_q(packet->pts, stream.time_base, AVRational{1, 1000000000}));
+      }
+    } else if (IsGpmf(stream) && packet->pts != AV_NOPTS_VALUE) {
+      result.gpmf.push_back({static_cast<double>(packet->pts) * unit_s,
+                             static_cast<double>(packet->duration) * unit_s,
+                             {packet->data, packet->data + packet->size}});
+    }
+    av_packet_unref(packet.get());
+  }
+  if (code != AVERROR_EOF) {
+    return BadInput(
+        Concat(file, ": reading stopped after ", packets, " frames (", FfmpegError(code), ")"));
+  }
+  if (cut_short || packets < video.nb_frames) {
+    return BadInput(Concat(file, ": the file is cut short: its index lists ", video.nb_frames,
+                           " frames, ", packets, " were found whole"));
+  }
+  std::sort(result.stamps_ns.begin(), result.stamps_ns.end());  // packets come in coding order
+  const auto repeated = std::adjacent_find(result.stamps_ns.begin(), result.stamps_ns.end());
+  if (repeated != result.stamps_ns.end()) {
+    return BadInput(Concat(file, ": two frames have the stamp ", *repeated, " ns"));
+  }
+  return result;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,35 @@
+// What a video file holds besides its pictures: frame stamps, size, telemetry packets.
+#ifndef CAMGYRO_FRONTEND_READERS_VIDEO_CONTAINER_H_
+#define CAMGYRO_FRONTEND_READERS_VIDEO_CONTAINER_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "frontend/readers/ffmpeg.h"
+
+namespace camgyro {
+
+struct DataPacket {
+  double start_s = 0.0, duration_s = 0.0;  // from the container's time 0
+  std::vector<uint8_t> bytes;
+};
+
+struct VideoContainer {
+  int width_px = 0, height_px = 0;  // as coded; a rotation for display is not applied
+  int display_rotation_deg = 0;     // of the display matrix, counter-clockwise; 0 without one
+  std::vector<int64_t> stamps_ns;   // of the shown frames, from the container's time 0, increasing
+  std::vector<DataPacket> gpmf;     // packets of a GoPro telemetry stream, in order
+};
+
+// Reads all packets of a file, without decoding any. Errors: not a video, no video stream, cut
+// short (fewer packets than its index lists), frames without or with repeated stamps.
+Result<VideoContainer> ReadVideoContainer(const std::string& file);
+
+// Opens a file and finds its streams.
+Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FRONTEND_READERS_VIDEO_CONTAINER_H_
