@@ -1,7 +1,6 @@
 #include "estimator/start/axis_permutation.h"
 
 #include <Eigen/LU>
-
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -226,17 +226,4 @@ Result<StartResult> FindStart(const Recording& recording,
   return result;
 }
 
-std::vector<CameraRotation> RotationsFromAttitudes(
-    const std::vector<Eigen::Quaterniond>& q_cam_world) {
-  std::vector<CameraRotation> rotations;
-  for (size_t a = 0; a + 1 < q_cam_world.size(); ++a) {
-    CameraRotation rotation;
-    rotation.frame_a = static_cast<int>(a);
-    rotation.frame_b = static_cast<int>(a) + 1;
-    rotation.q_a_b = q_cam_world[a] * q_cam_world[a + 1].conjugate();
-    rotations.push_back(rotation);
-  }
-  return rotations;
-}
-
 }  // namespace camgyro

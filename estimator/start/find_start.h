@@ -38,10 +38,10 @@ struct FocalResidual {
 struct StartFocal {
   double value_px = 0.0;
   double sigma_px = 0.0;
-  bool determined = false;  // false: value_px is only the best of the scan
-  // Residual of the best point / residual of the worst point in the scan's 25 % neighbourhood:
-  // near 1, the motion does not tell one field of view from the other.
-  double contrast = 1.0;
+  bool determined = false;  // sigma below 10 %; else value_px is the recording's guess, or the best
+  // Residual of the best point / best residual more than 25 % away, 0..1: near 1, the motion does
+  // not tell one field of view from the other.
+  double runner_up_ratio = 1.0;
   std::vector<FocalResidual> curve;
 };
 
@@ -70,13 +70,13 @@ struct StartResult {
   // Fraction of the gyro's power about its mean that the camera explains (all three axes, one
   // rotation, one bias, one scale), outliers down-weighted.
   double explained = 0.0;
-  double rate_ratio = 1.0;      // gyro rates / camera rates; 1 for a right focal length and unit
-  double inliers = 0.0;         // mean robust weight of the camera rotations, 0..1
-  double noise_rad_s = 0.0;     // residual rate per axis and pair
+  double rate_ratio = 1.0;   // gyro rates / camera rates; 1 for a right focal length and unit
+  double inliers = 0.0;      // fraction of camera rotations whose residuals normal noise explains
+  double noise_rad_s = 0.0;  // residual rate per axis and pair
   double gyro_rms_rad_s = 0.0;  // of the intervals' mean rates about their mean, all axes together
   int pairs = 0;
 
-  std::optional<StartFocal> focal;  // set by FindStartAndFocal
+  std::optional<StartFocal> focal;  // set by FindStartAndFocal (focal_scan.h)
   std::vector<std::string> notes;
 };
 
@@ -88,10 +88,6 @@ struct StartResult {
 Result<StartResult> FindStart(const Recording& recording,
                               const std::vector<CameraRotation>& rotations,
                               const StartOptions& options);
-
-// Camera rotations of attitudes: one for each two consecutive frames, sigma unknown (0).
-std::vector<CameraRotation> RotationsFromAttitudes(
-    const std::vector<Eigen::Quaterniond>& q_cam_world);
 
 }  // namespace camgyro
 

@@ -15,8 +15,10 @@ constexpr int kSize = StartFit::kSize;
 constexpr int kMaxIterations = 30;
 constexpr double kCauchy = 2.4;             // of the scale: 95 % efficient on normal residuals
 constexpr double kMedianNorm3 = 1.538;      // median norm of 3 normal variables of sigma 1
+constexpr double kInlierNorm3 = 3.37;       // 99 % of them
 constexpr double kUnexcitedSigmaRad = 1.0;  // see the header
 constexpr double kMaxStepS = 0.02;          // the linearisation holds within a lobe only
+constexpr double kMaxDecrement = 1e-6;      // Newton decrement, in sigmas squared
 constexpr int kBlocks = 30;                 // of the sandwich
 constexpr int kMinPairsPerBlock = 10;
 
@@ -56,7 +58,9 @@ std::vector<Linearized> Linearize(const RateAlignment& alignment, const StartFit
     out.J.col(0) = (RightJacobianInverse(angle) * state_b.omega_gyro_rad_s -
                     LeftJacobianInverse(angle) * state_a.omega_gyro_rad_s) /
                    interval_s;
-    out.J.block<3, 3>(0, 1) = R * Hat(c);
+    // By the rate that the gyro predicts for the camera, not by the camera's own: that one's noise
+    // would pose as rotation about axes about which nothing turns.
+    out.J.block<3, 3>(0, 1) = R * Hat(R.transpose() * (angle / interval_s));
     // The mean of the bias' effect over the interval is minus identity to first order in the angle.
     out.J.block<3, 3>(0, 4) = -Eigen::Matrix3d::Identity();
   }
@@ -95,36 +99,39 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
       norms.push_back(std::sqrt(weight[i]) * lines[i].residual.norm());
       rates.push_back(lines[i].residual.norm());
     }
-    // At least a millionth of the signal, for data without any noise.
+    // The floor is for data without any noise.
     const double scale = std::max(Median(norms) / kMedianNorm3, 1e-9);
     unit_variance = scale * scale;
     fit.noise_rad_s = Median(rates) / kMedianNorm3;
 
     normal.setZero();
     Vector gradient = Vector::Zero();
-    double sum = 0.0, count = 0.0;
+    double inliers = 0.0, count = 0.0;
     for (int i = 0; i < camera.size(); ++i) {
       fit.robust_weight[i] = 0.0;
       if (!lines[i].covered) continue;
       const double x = std::sqrt(weight[i]) * lines[i].residual.norm() / (kCauchy * scale);
       fit.robust_weight[i] = 1.0 / (1.0 + x * x);
-      sum += fit.robust_weight[i];
+      inliers += x * kCauchy < kInlierNorm3 ? 1.0 : 0.0;
       count += 1.0;
       const double w = weight[i] * fit.robust_weight[i];
       normal.noalias() += w * lines[i].J.transpose() * lines[i].J;
       gradient.noalias() += w * lines[i].J.transpose() * lines[i].residual;
     }
-    fit.inliers = count > 0.0 ? sum / count : 0.0;
-    for (int k = 1; k < 4; ++k) {
-      normal(k, k) += unit_variance / (kUnexcitedSigmaRad * kUnexcitedSigmaRad);
-    }
+    fit.inliers = count > 0.0 ? inliers / count : 0.0;
+    // A weak prior on the orientation given: holds what no motion excites.
+    const double prior = unit_variance / (kUnexcitedSigmaRad * kUnexcitedSigmaRad);
+    normal.block<3, 3>(1, 1).diagonal().array() += prior;
+    gradient.segment<3>(1) += prior * Log(q_gyro_cam.conjugate() * fit.q_gyro_cam);
     Vector step = -normal.ldlt().solve(gradient);
     if (!step.allFinite()) return fit;
     if (std::abs(step[0]) > kMaxStepS) step *= kMaxStepS / std::abs(step[0]);
     fit.lag_s += step[0];
     fit.q_gyro_cam = (fit.q_gyro_cam * Exp<double>(step.segment<3>(1))).normalized();
     fit.bias_gyro_rad_s += step.segment<3>(4);
-    if (std::abs(step[0]) < 1e-8 && step.tail<6>().norm() < 1e-7) {
+    // The second: steps far below the sigmas.
+    if ((std::abs(step[0]) < 1e-8 && step.tail<6>().norm() < 1e-7) ||
+        -gradient.dot(step) < kMaxDecrement * unit_variance) {
       fit.converged = true;
       break;
     }

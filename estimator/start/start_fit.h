@@ -19,7 +19,7 @@ struct StartFit {
   Eigen::Quaterniond q_gyro_cam = Eigen::Quaterniond::Identity();
   Eigen::Vector3d bias_gyro_rad_s = Eigen::Vector3d::Zero();
   Eigen::VectorXd robust_weight;  // 0..1 per pair, 0 outside the gyro's time
-  double inliers = 0.0;           // mean of those inside
+  double inliers = 0.0;           // fraction with residuals that normal noise explains (99 %)
   double noise_rad_s = 0.0;       // residual rate per axis and pair, robust
   Covariance covariance = Covariance::Zero();
   bool converged = false;

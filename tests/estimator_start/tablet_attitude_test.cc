@@ -1,59 +1,23 @@
 // The start on measured attitudes: ../shared/data/tablet-attitude, twelve hand-held minutes.
 #include <gmock/gmock.h>
 
-#include <chrono>
-#include <cstdio>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "../measured_data.h"
 #include "core/so3.h"
 #include "estimator/start/find_start.h"
+#include "frontend/readers/read_recording.h"
 
 namespace camgyro {
 namespace {
 
-struct Row {
-  int64_t stamp_ns;
-  std::vector<double> values;
-};
-
-// These files are known to be sound: "stamp,x,y,...", one header line. The readers have their own
-// tests; this one depends on core only.
-std::vector<Row> ReadRows(const std::string& path) {
-  std::vector<Row> rows;
-  std::ifstream file(path);
-  std::string line;
-  while (std::getline(file, line)) {
-    if (line.empty() || line[0] == '#') continue;
-    std::istringstream cells(line);
-    Row row;
-    std::string cell;
-    std::getline(cells, cell, ',');
-    row.stamp_ns = std::stoll(cell);
-    while (std::getline(cells, cell, ',')) row.values.push_back(std::stod(cell));
-    rows.push_back(row);
+std::vector<CameraRotation> Rotations(const std::vector<Eigen::Quaterniond>& q_cam_world) {
+  std::vector<CameraRotation> rotations;
+  for (int a = 0; a + 1 < static_cast<int>(q_cam_world.size()); ++a) {
+    rotations.push_back({a, a + 1, q_cam_world[a] * q_cam_world[a + 1].conjugate(), 0.0});
   }
-  return rows;
-}
-
-Recording ReadAttitudeRecording(const std::string& folder) {
-  Recording recording;
-  for (const Row& row : ReadRows(folder + "/cam0/attitude.csv")) {
-    Frame frame;
-    frame.stamp_ns = row.stamp_ns;
-    recording.frames.push_back(frame);
-    recording.q_cam_world.push_back(
-        Eigen::Quaterniond(row.values[0], row.values[1], row.values[2], row.values[3])
-            .normalized());
-  }
-  for (const Row& row : ReadRows(folder + "/imu0/data.csv")) {
-    if (!recording.gyro.empty() && row.stamp_ns <= recording.gyro.back().stamp_ns) continue;
-    recording.gyro.push_back({row.stamp_ns, {row.values[0], row.values[1], row.values[2]}});
-  }
-  return recording;
+  return rotations;
 }
 
 struct Expected {
@@ -74,11 +38,10 @@ class TabletAttitude : public ::testing::TestWithParam<Expected> {};
 TEST_P(TabletAttitude, DelayAndOrientation) {
   const auto folder = MeasuredData(std::string("tablet-attitude/") + GetParam().name);
   if (!folder) GTEST_SKIP() << "no measured recordings: set CAMGYRO_DATA";
-  const Recording recording = ReadAttitudeRecording(*folder);
-  ASSERT_EQ(recording.frames.size(), 1800u);
-  const auto begin = std::chrono::steady_clock::now();
-  const auto start = FindStart(recording, RotationsFromAttitudes(recording.q_cam_world), {});
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  const auto recording = ReadRecording(*folder);
+  ASSERT_TRUE(recording) << recording.error().message;
+  ASSERT_EQ(recording->frames.size(), 1800u);
+  const auto start = FindStart(*recording, Rotations(recording->q_cam_world), {});
   ASSERT_TRUE(start) << start.error().message;
   EXPECT_NEAR(1e3 * start->delay_middle_row_s, GetParam().delay_ms, GetParam().tolerance_ms);
 
@@ -88,19 +51,10 @@ TEST_P(TabletAttitude, DelayAndOrientation) {
   EXPECT_EQ(start->nearest_permutation, map);
   EXPECT_LT(start->permutation_angle_rad, 4.0 * M_PI / 180.0);
   EXPECT_EQ(start->rotation_axes_determined, 3);
-  std::printf(
-      "%s delay %10.2f ms +- %.2f (README %+.2f) axis map %.2f deg (sigma %.2f %.2f %.2f) bias "
-      "%.4f %.4f %.4f +- %.4f %.4f %.4f explained %.3f runner-up %.2f ratio %.3f inliers %.2f "
-      "noise %.3f time %.2f s\n",
-      GetParam().name, 1e3 * start->delay_middle_row_s, 1e3 * start->delay_sigma_s,
-      1e3 * start->delay_middle_row_s - GetParam().delay_ms,
-      start->permutation_angle_rad * 180.0 / M_PI, start->rotation_sigma_rad[0] * 180.0 / M_PI,
-      start->rotation_sigma_rad[1] * 180.0 / M_PI, start->rotation_sigma_rad[2] * 180.0 / M_PI,
-      start->bias_gyro_rad_s[0], start->bias_gyro_rad_s[1], start->bias_gyro_rad_s[2],
-      start->bias_sigma_rad_s[0], start->bias_sigma_rad_s[1], start->bias_sigma_rad_s[2],
-      start->explained, start->runner_up_ratio, start->rate_ratio, start->inliers,
-      start->noise_rad_s, took.count());
-  for (const auto& note : start->notes) std::printf("  %s\n", note.c_str());
+  // Noisy poses (D06-D10, see the README) explain 84 % and more, the others 97 %.
+  EXPECT_GT(start->explained, 0.8);
+  EXPECT_LT(start->runner_up_ratio, 0.4);
+  EXPECT_NEAR(start->rate_ratio, 1.0, 0.03);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, TabletAttitude, ::testing::ValuesIn(kExpected),
