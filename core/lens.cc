@@ -1,5 +1,6 @@
 #include "core/lens.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 namespace camgyro {
