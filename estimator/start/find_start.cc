@@ -12,7 +12,7 @@
 namespace camgyro {
 namespace {
 
-constexpr int kMaxTemplatePairs = 2000;  // of the search over all alignments: bounds its time
+constexpr int kMaxTemplatePairs = 900;  // of the search over all alignments: bounds its time
 // Below, even a fit without any noise would be of no use: 1 px per frame at 30 Hz and 600 px is
 // 0.05 rad/s. (Real micro-motion of 0.007 rad/s of a drone at rest is found, to 0.4 ms.)
 constexpr double kNoRotationRadS = 0.01;
@@ -198,11 +198,17 @@ Result<StartResult> FindStart(const Recording& recording,
       // A refusal that names a cause, other than a bad fit, is better than none.
       if (all_verdict.outcome == Outcome::kTrusted || verdict.outcome == Outcome::kNotFound) {
         search = std::move(near);
-        note = (verdict.outcome == Outcome::kNotFound
-                    ? "camera and gyro stamps do not overlap in time"
-                    : "within " + Seconds(options.search_s) + " of the stamps nothing fits") +
-               std::string("; with clocks of different origin they fit at a delay of ") +
-               Seconds(search.fit.lag_s + offset_s);
+        if (verdict.outcome == Outcome::kNotFound) {
+          note =
+              "camera and gyro stamps do not overlap in time; with clocks of different origin they "
+              "fit at a delay of " +
+              Seconds(search.fit.lag_s + offset_s);
+        } else if (std::abs(search.fit.lag_s - guess_lag_s) > options.search_s) {
+          note = "within " + Seconds(options.search_s) +
+                 " of the stamps nothing fits; with clocks "
+                 "of different origin they fit at a delay of " +
+                 Seconds(search.fit.lag_s + offset_s);
+        }
         if (verdict.outcome == Outcome::kNotFound && all_verdict.outcome != Outcome::kTrusted) {
           all_verdict.reason = verdict.reason + " (camera starts " + Seconds(-offset_s) +
                                " after the gyro, lasts " + Seconds(span_s) + ", the gyro " +

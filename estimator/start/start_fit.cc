@@ -18,11 +18,12 @@ constexpr double kMedianNorm3 = 1.538;  // median norm of 3 normal variables of 
 // A wrong lens makes residuals in proportion to the rate. Without this tolerance
 // a minute of rest with one turn in it would take the turn for an outlier.
 constexpr double kModelError = 0.05;
-constexpr double kInlierNorm3 = 3.37;       // 99 % of them
-constexpr double kUnexcitedSigmaRad = 1.0;  // see the header
-constexpr double kMaxStepS = 0.02;          // the linearisation holds within a lobe only
-constexpr double kMaxDecrement = 1e-6;      // Newton decrement, in sigmas squared
-constexpr int kBlocks = 30;                 // of the sandwich
+constexpr double kInlierNorm3 = 3.37;        // 99 % of them
+constexpr double kUnexcitedSigmaRad = 1.0;   // see the header
+constexpr double kMaxStepS = 0.02;           // the linearisation holds within a lobe only
+constexpr double kSmallDecrement = 1e-6;     // Newton decrement, in sigmas squared
+constexpr double kHarmlessDecrement = 1e-2;  // after all iterations
+constexpr int kBlocks = 30;                  // of the sandwich
 constexpr int kMinPairsPerBlock = 10;
 
 struct Linearized {
@@ -136,6 +137,7 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
   Matrix normal;
   std::vector<Linearized> lines;
   double unit_variance = 0.0;  // of residual * sqrt(weight)
+  double decrement = 0.0;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     lines = Linearize(alignment, fit);
     std::vector<double> norms, rates;
@@ -178,13 +180,14 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
     fit.bias_gyro_rad_s += step.segment<3>(4);
     fit.rate_ratio += step[7];
     if (!(fit.rate_ratio > 0.0)) return fit;
-    // The second: steps far below the sigmas.
-    if ((std::abs(step[0]) < 1e-8 && step.tail<7>().norm() < 1e-7) ||
-        -gradient.dot(step) < kMaxDecrement * unit_variance) {
+    decrement = -gradient.dot(step) / unit_variance;
+    if ((std::abs(step[0]) < 1e-8 && step.tail<7>().norm() < 1e-7) || decrement < kSmallDecrement) {
       fit.converged = true;
       break;
     }
   }
+  // Along a direction that hardly anything excites, steps shrink slowly; they no longer matter.
+  fit.converged = fit.converged || decrement < kHarmlessDecrement;
 
   const Matrix inverse = normal.ldlt().solve(Matrix::Identity());
   const Matrix classical = unit_variance * inverse;
