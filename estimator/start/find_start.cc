@@ -12,9 +12,11 @@
 namespace camgyro {
 namespace {
 
-constexpr int kMaxTemplatePairs = 2000;  // of the search over all alignments: bounds its time
-constexpr double kNoRotationRadS = 0.003;
-constexpr double kWeakRotationRadS = 0.02;
+constexpr int kMaxTemplatePairs = 900;  // of the search over all alignments: bounds its time
+// Below, even a fit without any noise would be of no use: 1 px per frame at 30 Hz and 600 px is
+// 0.05 rad/s. (Real micro-motion of 0.007 rad/s of a drone at rest is found, to 0.4 ms.)
+constexpr double kNoRotationRadS = 0.01;
+constexpr double kGoodFit = 0.9;  // explained; below, a note
 constexpr double kDegreesPerRadian = 57.29577951308232;
 constexpr double kUnitTolerance = 1.2;
 
@@ -34,21 +36,6 @@ struct Verdict {
   std::string reason;
 };
 
-// White noise of the intervals' mean rates [rad/s], all axes together, from the gyro's second
-// differences: motion is smooth at the gyro's rate.
-double GyroNoise(const GyroRates& gyro, double interval_s) {
-  const auto n = static_cast<Eigen::Index>(gyro.times_s.size());
-  if (n < 3) return 0.0;
-  const Eigen::Matrix3Xd& w = gyro.omega_gyro_rad_s;
-  double power = 0.0;
-  for (Eigen::Index k = 2; k < n; ++k) {
-    power += (w.col(k) - 2.0 * w.col(k - 1) + w.col(k - 2)).squaredNorm() / 6.0;
-  }
-  const double span_s = gyro.times_s.back() - gyro.times_s.front();
-  const double samples = std::max(1.0, interval_s * static_cast<double>(n - 1) / span_s);
-  return std::sqrt(power / static_cast<double>(n - 2) / samples);
-}
-
 bool IsFactor(double ratio, double factor) {
   return ratio > factor / kUnitTolerance && ratio < factor * kUnitTolerance;
 }
@@ -60,9 +47,9 @@ Verdict Judge(const LagSearch& search, double gyro_noise_rad_s, double delay_off
     return {Outcome::kNotFound, "no overlap in time between camera and gyro"};
   }
   const RateAlignment::Fit& fit = search.best;
-  if (fit.gyro_rms_rad_s < kNoRotationRadS) {
+  if (search.gyro_rms_rad_s < kNoRotationRadS) {
     return {Outcome::kRefused, "no rotation in the recording: the gyro's rate varies by " +
-                                   Rate(fit.gyro_rms_rad_s) + " rms only"};
+                                   Rate(search.gyro_rms_rad_s) + " rms only"};
   }
   const double explained = fit.explained, mirrored = search.mirrored.explained_mirrored;
   if (mirrored >= options.min_explained &&
@@ -80,9 +67,9 @@ Verdict Judge(const LagSearch& search, double gyro_noise_rad_s, double delay_off
   }
   if (explained < options.min_explained || search.on_edge) {
     std::string reason;
-    if (fit.gyro_rms_rad_s < std::max(kWeakRotationRadS, 3.0 * gyro_noise_rad_s)) {
+    if (search.gyro_rms_rad_s < 3.0 * gyro_noise_rad_s) {
       reason = "no rotation in the recording that stands out: the gyro's rate varies by " +
-               Rate(fit.gyro_rms_rad_s) + " rms, of which noise " + Rate(gyro_noise_rad_s) +
+               Rate(search.gyro_rms_rad_s) + " rms, of which noise " + Rate(gyro_noise_rad_s) +
                "; the camera's by " + Rate(fit.cam_rms_rad_s);
     } else {
       reason = "the picture does not follow the gyro (at the best delay the camera explains " +
@@ -137,13 +124,20 @@ StartResult MakeResult(const LagSearch& search, double delay_offset_s,
   result.permutation_angle_rad = nearest.angle_rad;
 
   result.bias_gyro_rad_s = fit.bias_gyro_rad_s;
-  result.bias_sigma_rad_s = fit.covariance.diagonal().tail<3>().cwiseSqrt();
+  result.bias_sigma_rad_s = fit.covariance.diagonal().segment<3>(4).cwiseSqrt();
   result.explained = search.best.explained;
-  result.rate_ratio = search.best.rate_ratio;
+  result.rate_ratio = fit.rate_ratio;
+  result.rate_ratio_sigma = std::sqrt(fit.covariance(7, 7));
   result.inliers = fit.inliers;
   result.noise_rad_s = fit.noise_rad_s;
-  result.gyro_rms_rad_s = search.best.gyro_rms_rad_s;
+  result.gyro_rms_rad_s = search.gyro_rms_rad_s;
   result.pairs = search.best.pairs;
+  if (result.explained < kGoodFit) {
+    result.notes.push_back(
+        "the camera explains " + Percent(result.explained) +
+        " of the gyro's motion: noisy camera rotations, or a wrong lens or focal "
+        "length");
+  }
   return result;
 }
 
@@ -169,7 +163,7 @@ Result<StartResult> FindStart(const Recording& recording,
                           std::to_string(options.min_pairs) + " in " + Seconds(options.min_span_s));
   }
   const double gyro_span_s = gyro.times_s.back();
-  const double noise = GyroNoise(gyro, span_s / camera.size());
+  const double noise = std::sqrt(3.0) * gyro.Noise(span_s / camera.size());
   const CameraRates liveliest = LiveliestStretch(camera, kMaxTemplatePairs);
   const RateAlignment alignment(gyro, std::move(camera));
 
@@ -204,11 +198,17 @@ Result<StartResult> FindStart(const Recording& recording,
       // A refusal that names a cause, other than a bad fit, is better than none.
       if (all_verdict.outcome == Outcome::kTrusted || verdict.outcome == Outcome::kNotFound) {
         search = std::move(near);
-        note = (verdict.outcome == Outcome::kNotFound
-                    ? "camera and gyro stamps do not overlap in time"
-                    : "within " + Seconds(options.search_s) + " of the stamps nothing fits") +
-               std::string("; with clocks of different origin they fit at a delay of ") +
-               Seconds(search.fit.lag_s + offset_s);
+        if (verdict.outcome == Outcome::kNotFound) {
+          note =
+              "camera and gyro stamps do not overlap in time; with clocks of different origin they "
+              "fit at a delay of " +
+              Seconds(search.fit.lag_s + offset_s);
+        } else if (std::abs(search.fit.lag_s - guess_lag_s) > options.search_s) {
+          note = "within " + Seconds(options.search_s) +
+                 " of the stamps nothing fits; with clocks "
+                 "of different origin they fit at a delay of " +
+                 Seconds(search.fit.lag_s + offset_s);
+        }
         if (verdict.outcome == Outcome::kNotFound && all_verdict.outcome != Outcome::kTrusted) {
           all_verdict.reason = verdict.reason + " (camera starts " + Seconds(-offset_s) +
                                " after the gyro, lasts " + Seconds(span_s) + ", the gyro " +

@@ -32,13 +32,14 @@ struct DelayResidual {
 // One point of the focal scan.
 struct FocalResidual {
   double focal_px = 0.0;
-  double residual = 1.0;  // mean truncated squared residual, relative to the gyro's power
+  double residual = 1.0;  // truncated squares of pan and tilt, relative to the gyro's
 };
 
 struct StartFocal {
   double value_px = 0.0;
   double sigma_px = 0.0;
-  bool determined = false;  // sigma below 10 %; else value_px is the recording's guess, or the best
+  // Sigma below 10 % and a distinct minimum; else value_px is the recording's guess or a usual one.
+  bool determined = false;
   // Residual of the best point / best residual more than 25 % away, 0..1: near 1, the motion does
   // not tell one field of view from the other.
   double runner_up_ratio = 1.0;
@@ -70,7 +71,8 @@ struct StartResult {
   // Fraction of the gyro's power about its mean that the camera explains (all three axes, one
   // rotation, one bias, one scale), outliers down-weighted.
   double explained = 0.0;
-  double rate_ratio = 1.0;   // gyro rates / camera rates; 1 for a right focal length and unit
+  double rate_ratio = 1.0;  // gyro rates / camera rates; 1 for a right focal length and unit
+  double rate_ratio_sigma = 0.0;
   double inliers = 0.0;      // fraction of camera rotations whose residuals normal noise explains
   double noise_rad_s = 0.0;  // residual rate per axis and pair
   double gyro_rms_rad_s = 0.0;  // of the intervals' mean rates about their mean, all axes together

@@ -15,46 +15,58 @@ namespace camgyro {
 namespace {
 
 constexpr int kBlocks = 20;              // of time, for the honest sigma
-constexpr double kTruncateSigmas = 3.0;  // of the norm of three axes
+constexpr double kTruncateSigmas = 3.0;  // of the norm of two axes
+constexpr double kMedianNorm2 = 1.177;   // median norm of 2 normal variables of sigma 1
 constexpr double kDeterminedLog = 0.1;   // sigma of log f
 constexpr double kDistinctLog = 0.22;    // 25 %
-constexpr double kMaxPull = 0.2;         // of log f, by noise
+constexpr double kMaxRunnerUp = 0.8;     // a wrong lens moves shallow minima far
+constexpr double kModelLog = 0.02;       // rotations of pictures neglect rolling shutter and lens
+constexpr double kUnknownLog = 0.3;      // what is known of any lens
+constexpr double kUsualFocal = 0.85;     // of the longer side
 constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
 
 struct ScanPoint {
   double log_focal = 0.0;
   std::vector<CameraRotation> rotations;
-  // Squared residual rates of each pair, and the pair's block; filled by Measure.
+  // Squared residuals of pan and tilt of each pair [(px/s)^2], and the pair's block.
   std::vector<double> squares;
   std::vector<int> blocks;
-  double noise_rad_s = 0.0;
+  double noise_px_s = 0.0;
   double gyro_power = 0.0;
   // Truncated losses per block, and the total.
   Eigen::VectorXd loss;
 };
 
-// Squared residuals at one focal length, lag, orientation and bias fitted to it.
+// Residuals at one focal length, with lag, orientation and bias fitted to it. In the image (angle
+// times focal length), where the camera's noise does not depend on the focal length assumed: in
+// angles, a longer focal length would always shrink it, and win.
 void Measure(const Recording& recording, const StartResult& near, double lag_s,
              const StartOptions& options, ScanPoint* point) {
   GyroRates gyro(recording.gyro);
   auto camera = MakeCameraRates(recording, point->rotations, gyro);
   if (!camera || camera->size() < options.min_pairs) return;
   const RateAlignment alignment(std::move(gyro), *std::move(camera));
-  const StartFit fit = FitStart(alignment, lag_s, near.q_gyro_cam, near.bias_gyro_rad_s);
+  const StartFit fit = FitStart(alignment, lag_s, near.q_gyro_cam, near.bias_gyro_rad_s, 1.0);
   Eigen::Matrix3Xd rates;
   std::vector<char> covered;
   alignment.MeanGyroRates(fit.lag_s, &rates, &covered);
   const CameraRates& cam = alignment.camera();
   const int frames = static_cast<int>(recording.frames.size());
+  const double focal_px = std::exp(point->log_focal);
+  std::vector<double> norms;
   for (int i = 0; i < cam.size(); ++i) {
     if (!covered[i]) continue;
-    const Eigen::Vector3d gyro_rate = rates.col(i) - fit.bias_gyro_rad_s;
-    const Eigen::Vector3d residual = gyro_rate - fit.q_gyro_cam * cam.omega_cam_rad_s.col(i);
-    point->squares.push_back(cam.weight[i] * residual.squaredNorm());
+    const Eigen::Vector3d gyro_rate_cam =
+        fit.q_gyro_cam.conjugate() * (rates.col(i) - fit.bias_gyro_rad_s);
+    const double scale = focal_px * std::sqrt(cam.weight[i]);
+    norms.push_back(scale * (cam.omega_cam_rad_s.col(i) - gyro_rate_cam).head<2>().norm());
+    point->squares.push_back(norms.back() * norms.back());
     point->blocks.push_back(cam.frame_a[i] * kBlocks / frames);
-    point->gyro_power += cam.weight[i] * gyro_rate.squaredNorm();
+    point->gyro_power += cam.weight[i] * gyro_rate_cam.head<2>().squaredNorm();
   }
-  point->noise_rad_s = fit.noise_rad_s;
+  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
+  std::nth_element(norms.begin(), middle, norms.end());
+  point->noise_px_s = *middle / kMedianNorm2;
 }
 
 // Parabola y = c0 + c1 x + c2 x^2 through points (least squares); rows of coefficients per column
@@ -93,7 +105,7 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
     points[k].rotations = rotations_at(std::exp(points[k].log_focal));
     order.push_back(k);
   }
-  const double log_guess = std::log(recording.camera.focal_px.value_or(0.85 * side_px));
+  const double log_guess = std::log(recording.camera.focal_px.value_or(kUsualFocal * side_px));
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return std::abs(points[a].log_focal - log_guess) < std::abs(points[b].log_focal - log_guess);
   });
@@ -112,16 +124,16 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
 
   // 2. The scan, and two points more around its best.
   for (ScanPoint& point : points) Measure(recording, *near, lag_s, options, &point);
-  double noise_rad_s = -1.0, gyro_power = 0.0;
+  double noise_px_s = -1.0, gyro_power = 0.0;
   size_t pairs = 1;
   const auto truncate = [&] {
     for (const ScanPoint& point : points) {
       if (point.squares.empty()) continue;
-      if (noise_rad_s < 0.0 || point.noise_rad_s < noise_rad_s) noise_rad_s = point.noise_rad_s;
+      if (noise_px_s < 0.0 || point.noise_px_s < noise_px_s) noise_px_s = point.noise_px_s;
       pairs = std::max(pairs, point.squares.size());
       gyro_power = std::max(gyro_power, point.gyro_power);
     }
-    const double cap = 3.0 * std::pow(kTruncateSigmas * noise_rad_s, 2);
+    const double cap = 2.0 * std::pow(kTruncateSigmas * noise_px_s, 2);
     for (ScanPoint& point : points) {
       point.loss = Eigen::VectorXd::Zero(kBlocks);
       for (size_t i = 0; i < point.squares.size(); ++i) {
@@ -159,7 +171,8 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   std::vector<size_t> close;
   for (size_t k = 0; k < points.size(); ++k) {
     const double loss = points[k].loss.sum(), distance = std::abs(points[k].log_focal - best_log);
-    focal.curve.push_back({std::exp(points[k].log_focal), loss / gyro_power});
+    focal.curve.push_back(
+        {std::exp(points[k].log_focal), loss / (gyro_power * std::exp(2.0 * best_log))});
     if (distance < 1.1 * spacing) close.push_back(k);
     if (distance > kDistinctLog && (second_loss < 0.0 || loss < second_loss)) second_loss = loss;
   }
@@ -177,21 +190,19 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   if (inside && sum[2] > 0.0) {
     const double shift = std::clamp(-0.5 * sum[1] / sum[2], -spacing, spacing);
     log_focal += shift;
-    // The camera's rates are the regressor here, and their noise pulls the best scale down, f up,
-    // by (noise power of two axes) / (power of pan and tilt). The parabola's bend is the latter.
-    const double pull =
-        std::min(2.0 * noise_rad_s * noise_rad_s * static_cast<double>(pairs) / sum[2], kMaxPull);
-    log_focal -= pull;
-    const double classical = noise_rad_s * noise_rad_s / sum[2];
+    const double classical = noise_px_s * noise_px_s / sum[2];
     const double scores = (parabolas.row(1) + 2.0 * shift * parabolas.row(2)).squaredNorm() *
                           kBlocks / (kBlocks - 1.0);
     const double sandwich = scores / (4.0 * sum[2] * sum[2]);
-    const double of_pull = 0.25 * pull * pull;  // it is known to a half
-    sigma_log = std::min(1.0, std::sqrt(std::max(classical, sandwich) + of_pull));
+    sigma_log = std::min(1.0, std::sqrt(std::max(classical, sandwich)));
   }
-  focal.determined = sigma_log < kDeterminedLog;
-  focal.value_px = !focal.determined && recording.camera.focal_px ? *recording.camera.focal_px
-                                                                  : std::exp(log_focal);
+  sigma_log = std::hypot(sigma_log, kModelLog);
+  focal.determined = sigma_log < kDeterminedLog && focal.runner_up_ratio < kMaxRunnerUp;
+  if (!focal.determined) {
+    log_focal = log_guess;
+    sigma_log = kUnknownLog;
+  }
+  focal.value_px = std::exp(log_focal);
   focal.sigma_px = sigma_log * focal.value_px;
 
   // 4. The start at that focal length.
@@ -199,8 +210,8 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   if (!start) return start;
   if (!focal.determined) {
     start->notes.push_back(
-        "this motion does not determine the focal length (it needs pan or tilt); " +
-        std::string(recording.camera.focal_px ? "the recording's guess" : "the scan's best") +
+        "the focal length is not determined (too little pan and tilt, or a distorting lens); " +
+        std::string(recording.camera.focal_px ? "the recording's guess" : "a usual one") +
         " is used");
   }
   start->focal = std::move(focal);

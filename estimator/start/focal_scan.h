@@ -23,12 +23,12 @@ struct FocalScanOptions {
 };
 
 // The gyro measures angles, the picture measures pan and tilt as angle times focal length (roll
-// without): the focal length whose rotations fit the gyro best, at one scale. The residual is
+// without): the focal length whose pan and tilt fit the gyro best. The residual, in pixels, is
 // truncated at 3 sigma, its minimum refined by a parabola in log f; sigma from the parabola and
 // from how blocks of time disagree. Then FindStart at that focal length, with `focal` set. If
-// the motion does not tell (roll only, hardly any rotation), focal->determined is false, a note
-// says so, and the rest is computed at the recording's guess, or at the best of the scan without
-// one.
+// the motion does not tell (roll only, hardly any rotation) or the lens distorts so much that the
+// minimum is shallow, focal->determined is false, a note says so, and the recording's guess is
+// used, or 0.85 of the longer side without one.
 Result<StartResult> FindStartAndFocal(const Recording& recording,
                                       const CameraRotationsAtFocal& rotations_at,
                                       const StartOptions& options,

@@ -93,12 +93,14 @@ LagSearch SearchLag(const RateAlignment& alignment, double first_lag_s, double l
     FindRunnerUp(best, &search);
     const double lag_s = search.curve[best].lag_s;
     search.best = alignment.At(lag_s, weight);
+    if (round == 0) search.gyro_rms_rad_s = search.best.gyro_rms_rad_s;
     search.fit.lag_s = lag_s;
     search.fit.q_gyro_cam = Eigen::Quaterniond(search.best.R_gyro_cam);
     search.fit.bias_gyro_rad_s = search.best.bias_gyro_rad_s;
     const double ratio = search.best.rate_ratio;
     if (!(ratio < kMaxRateRatio && ratio > 1.0 / kMaxRateRatio)) break;
-    search.fit = FitStart(alignment, lag_s, search.fit.q_gyro_cam, search.fit.bias_gyro_rad_s);
+    search.fit =
+        FitStart(alignment, lag_s, search.fit.q_gyro_cam, search.fit.bias_gyro_rad_s, ratio);
     if (!search.fit.converged || std::abs(search.fit.lag_s - lag_s) > 3.0 * step_s) {
       // No minimum near the grid's best point.
       search.fit.converged = false;
@@ -166,9 +168,10 @@ Result<CameraRates> MakeCameraRates(const Recording& recording,
     camera.frame_a.push_back(rotation.frame_a);
     camera.frame_b.push_back(rotation.frame_b);
     kept.push_back(rates[i]);
+    const double interval_s =
+        camera.frame_times_s[rotation.frame_b] - camera.frame_times_s[rotation.frame_a];
     const double sigma = rotation.sigma_rad > 0.0 ? rotation.sigma_rad : usual_sigma;
-    const double sqrt_weight =
-        (camera.frame_times_s[rotation.frame_b] - camera.frame_times_s[rotation.frame_a]) / sigma;
+    const double sqrt_weight = interval_s / std::hypot(sigma, gyro.Noise(interval_s) * interval_s);
     weights.push_back(sqrt_weight * sqrt_weight);
   }
   const double usual_weight = Median(weights);

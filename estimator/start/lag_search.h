@@ -23,6 +23,7 @@ struct LagSearch {
   bool on_edge = false;         // best at an end of the range: no minimum
   RateAlignment::Fit best;      // at fit.lag_s, with robust weights
   RateAlignment::Fit mirrored;  // at the lag of the best improper fit
+  double gyro_rms_rad_s = 0.0;  // at the best lag, about the mean, without weights
   StartFit fit;
   double runner_up_ratio = 1.0;
   double runner_up_lag_s = 0.0;

@@ -18,6 +18,18 @@ GyroRates::GyroRates(const std::vector<GyroSample>& gyro)
   }
 }
 
+double GyroRates::Noise(double interval_s) const {
+  const auto n = static_cast<Eigen::Index>(times_s.size());
+  if (n < 3) return 0.0;
+  const Eigen::Matrix3Xd& w = omega_gyro_rad_s;
+  const double squares =
+      (w.rightCols(n - 2) - 2.0 * w.middleCols(1, n - 2) + w.leftCols(n - 2)).squaredNorm();
+  const double variance = squares / (3.0 * 6.0 * static_cast<double>(n - 2));
+  const double samples =
+      std::max(1.0, interval_s * static_cast<double>(n - 1) / (times_s.back() - times_s.front()));
+  return std::sqrt(variance / samples);
+}
+
 RateAlignment::RateAlignment(GyroRates gyro, CameraRates camera)
     : gyro_(std::move(gyro)), camera_(std::move(camera)) {
   const size_t n = gyro_.times_s.size();

@@ -12,6 +12,11 @@ namespace camgyro {
 // Gyro samples as arrays. Times [s] from the first gyro stamp; rates [rad/s] as columns.
 struct GyroRates {
   explicit GyroRates(const std::vector<GyroSample>& gyro);
+
+  // White noise of the mean rate over an interval [rad/s], one axis, from the second differences of
+  // the samples: motion is smooth at the gyro's rate, vibration is not.
+  double Noise(double interval_s) const;
+
   std::vector<double> times_s;
   Eigen::Matrix3Xd omega_gyro_rad_s;
 };
@@ -21,7 +26,7 @@ struct CameraRates {
   std::vector<double> frame_times_s;  // all frames, from the first frame's stamp
   std::vector<int> frame_a, frame_b;  // one entry per pair
   Eigen::Matrix3Xd omega_cam_rad_s;   // Log(q_a_b) / interval, 3 x pairs
-  Eigen::VectorXd weight;             // interval^2 / sigma^2, up to one factor: inverse variance
+  Eigen::VectorXd weight;             // inverse variance of their noise and the gyro's; median 1
 
   int size() const { return static_cast<int>(frame_a.size()); }
   double interval_s(int pair) const {

@@ -13,18 +13,23 @@ namespace {
 
 constexpr int kSize = StartFit::kSize;
 constexpr int kMaxIterations = 30;
-constexpr double kCauchy = 2.4;             // of the scale: 95 % efficient on normal residuals
-constexpr double kMedianNorm3 = 1.538;      // median norm of 3 normal variables of sigma 1
-constexpr double kInlierNorm3 = 3.37;       // 99 % of them
-constexpr double kUnexcitedSigmaRad = 1.0;  // see the header
-constexpr double kMaxStepS = 0.02;          // the linearisation holds within a lobe only
-constexpr double kMaxDecrement = 1e-6;      // Newton decrement, in sigmas squared
-constexpr int kBlocks = 30;                 // of the sandwich
+constexpr double kCauchy = 2.4;         // of the scale: 95 % efficient on normal residuals
+constexpr double kMedianNorm3 = 1.538;  // median norm of 3 normal variables of sigma 1
+// A wrong lens makes residuals in proportion to the rate. Without this tolerance
+// a minute of rest with one turn in it would take the turn for an outlier.
+constexpr double kModelError = 0.05;
+constexpr double kInlierNorm3 = 3.37;        // 99 % of them
+constexpr double kUnexcitedSigmaRad = 1.0;   // see the header
+constexpr double kMaxStepS = 0.02;           // the linearisation holds within a lobe only
+constexpr double kSmallDecrement = 1e-6;     // Newton decrement, in sigmas squared
+constexpr double kHarmlessDecrement = 1e-2;  // after all iterations
+constexpr int kBlocks = 30;                  // of the sandwich
 constexpr int kMinPairsPerBlock = 10;
 
 struct Linearized {
   Eigen::Matrix<double, 3, kSize> J;
   Eigen::Vector3d residual;
+  Eigen::Vector3d gyro_rate;  // bias removed
   bool covered = false;
 };
 
@@ -54,17 +59,56 @@ std::vector<Linearized> Linearize(const RateAlignment& alignment, const StartFit
     const Eigen::Vector3d c = camera.omega_cam_rad_s.col(i);
     Linearized& out = all[i];
     out.covered = true;
-    out.residual = angle / interval_s - R * c;
+    out.gyro_rate = angle / interval_s;
+    out.residual = out.gyro_rate - at.rate_ratio * (R * c);
     out.J.col(0) = (RightJacobianInverse(angle) * state_b.omega_gyro_rad_s -
                     LeftJacobianInverse(angle) * state_a.omega_gyro_rad_s) /
                    interval_s;
     // By the rate that the gyro predicts for the camera, not by the camera's own: that one's noise
     // would pose as rotation about axes about which nothing turns.
-    out.J.block<3, 3>(0, 1) = R * Hat(R.transpose() * (angle / interval_s));
+    out.J.block<3, 3>(0, 1) = R * Hat(R.transpose() * out.gyro_rate);
     // The mean of the bias' effect over the interval is minus identity to first order in the angle.
     out.J.block<3, 3>(0, 4) = -Eigen::Matrix3d::Identity();
+    out.J.col(7) = -out.gyro_rate / at.rate_ratio;
   }
   return all;
+}
+
+// Mean squared rate of the gyro about its mean [rad^2/s^2].
+double GyroPower(const std::vector<Linearized>& lines, const Eigen::VectorXd& weight,
+                 const Eigen::VectorXd& robust_weight) {
+  double sum_w = 0.0, sum_squares = 0.0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < lines.size(); ++i) {
+    if (!lines[i].covered) continue;
+    const double w = weight[i] * robust_weight[i];
+    sum_w += w;
+    sum += w * lines[i].gyro_rate;
+    sum_squares += w * lines[i].gyro_rate.squaredNorm();
+  }
+  return sum_w > 0.0 ? sum_squares / sum_w - (sum / sum_w).squaredNorm() : 0.0;
+}
+
+// Part of the gyro's power that is in residuals which one pair passes on to the next: not noise but
+// a model that does not fit (lens, focal length, translation taken for rotation). White noise up to
+// two sigma of the correlation does not count.
+double SystematicFraction(const std::vector<Linearized>& lines, const Eigen::VectorXd& weight,
+                          const Eigen::VectorXd& robust_weight) {
+  double squares = 0.0, products = 0.0, sum_w = 0.0, count = 0.0;
+  for (size_t i = 0; i < lines.size(); ++i) {
+    if (!lines[i].covered) continue;
+    const double w = weight[i] * robust_weight[i];
+    sum_w += w;
+    squares += w * lines[i].residual.squaredNorm();
+    if (i == 0 || !lines[i - 1].covered) continue;
+    const double w_before = weight[i - 1] * robust_weight[i - 1];
+    products += std::sqrt(w * w_before) * lines[i].residual.dot(lines[i - 1].residual);
+    count += 1.0;
+  }
+  const double power = GyroPower(lines, weight, robust_weight);
+  if (!(squares > 0.0) || !(power > 0.0)) return 0.0;
+  const double correlation = products / squares - 2.0 / std::sqrt(std::max(1.0, count));
+  return std::clamp(correlation, 0.0, 1.0) * squares / sum_w / power;
 }
 
 double Median(std::vector<double> values) {
@@ -77,7 +121,8 @@ double Median(std::vector<double> values) {
 }  // namespace
 
 StartFit FitStart(const RateAlignment& alignment, double lag_s,
-                  const Eigen::Quaterniond& q_gyro_cam, const Eigen::Vector3d& bias_gyro_rad_s) {
+                  const Eigen::Quaterniond& q_gyro_cam, const Eigen::Vector3d& bias_gyro_rad_s,
+                  double rate_ratio) {
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = StartFit::Covariance;
   const CameraRates& camera = alignment.camera();
@@ -87,10 +132,12 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
   fit.lag_s = lag_s;
   fit.q_gyro_cam = q_gyro_cam;
   fit.bias_gyro_rad_s = bias_gyro_rad_s;
+  fit.rate_ratio = rate_ratio;
   fit.robust_weight = Eigen::VectorXd::Zero(camera.size());
   Matrix normal;
   std::vector<Linearized> lines;
   double unit_variance = 0.0;  // of residual * sqrt(weight)
+  double decrement = 0.0;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     lines = Linearize(alignment, fit);
     std::vector<double> norms, rates;
@@ -110,9 +157,11 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
     for (int i = 0; i < camera.size(); ++i) {
       fit.robust_weight[i] = 0.0;
       if (!lines[i].covered) continue;
-      const double x = std::sqrt(weight[i]) * lines[i].residual.norm() / (kCauchy * scale);
-      fit.robust_weight[i] = 1.0 / (1.0 + x * x);
-      inliers += x * kCauchy < kInlierNorm3 ? 1.0 : 0.0;
+      const double tolerated =
+          std::hypot(scale, kModelError * std::sqrt(weight[i]) * lines[i].gyro_rate.norm());
+      const double x = std::sqrt(weight[i]) * lines[i].residual.norm() / tolerated;
+      fit.robust_weight[i] = 1.0 / (1.0 + x * x / (kCauchy * kCauchy));
+      inliers += x < kInlierNorm3 ? 1.0 : 0.0;
       count += 1.0;
       const double w = weight[i] * fit.robust_weight[i];
       normal.noalias() += w * lines[i].J.transpose() * lines[i].J;
@@ -129,13 +178,16 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
     fit.lag_s += step[0];
     fit.q_gyro_cam = (fit.q_gyro_cam * Exp<double>(step.segment<3>(1))).normalized();
     fit.bias_gyro_rad_s += step.segment<3>(4);
-    // The second: steps far below the sigmas.
-    if ((std::abs(step[0]) < 1e-8 && step.tail<6>().norm() < 1e-7) ||
-        -gradient.dot(step) < kMaxDecrement * unit_variance) {
+    fit.rate_ratio += step[7];
+    if (!(fit.rate_ratio > 0.0)) return fit;
+    decrement = -gradient.dot(step) / unit_variance;
+    if ((std::abs(step[0]) < 1e-8 && step.tail<7>().norm() < 1e-7) || decrement < kSmallDecrement) {
       fit.converged = true;
       break;
     }
   }
+  // Along a direction that hardly anything excites, steps shrink slowly; they no longer matter.
+  fit.converged = fit.converged || decrement < kHarmlessDecrement;
 
   const Matrix inverse = normal.ldlt().solve(Matrix::Identity());
   const Matrix classical = unit_variance * inverse;
@@ -153,9 +205,12 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
     meat += score * score.transpose();
   }
   const Matrix sandwich = (blocks > 1 ? blocks / (blocks - 1.0) : 0.0) * inverse * meat * inverse;
-  const Vector stretch =
-      (sandwich.diagonal().cwiseMax(classical.diagonal()).array() / classical.diagonal().array())
-          .sqrt();
+  Vector variance = sandwich.diagonal().cwiseMax(classical.diagonal());
+  const double systematic = SystematicFraction(lines, weight, fit.robust_weight);
+  const double systematic_sq = systematic * systematic;
+  variance.segment<3>(1).array() += systematic_sq;
+  variance.segment<3>(4).array() += systematic_sq * GyroPower(lines, weight, fit.robust_weight);
+  const Vector stretch = (variance.array() / classical.diagonal().array()).sqrt();
   fit.covariance = stretch.asDiagonal() * classical * stretch.asDiagonal();
   return fit;
 }

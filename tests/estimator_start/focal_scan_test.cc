@@ -52,7 +52,7 @@ TEST(FindStartAndFocal, FindsTheFocalLength) {
     ASSERT_TRUE(start->focal);
     EXPECT_TRUE(start->focal->determined);
     EXPECT_NEAR(start->focal->value_px, kTrueFocalPx, 0.02 * kTrueFocalPx);
-    EXPECT_LT(start->focal->sigma_px, 0.02 * kTrueFocalPx);
+    EXPECT_LT(start->focal->sigma_px, 0.025 * kTrueFocalPx);
     EXPECT_LT(start->focal->runner_up_ratio, 0.7);
     EXPECT_NEAR(start->delay_middle_row_s, UsualTruth().delay_s, 0.003);
     EXPECT_EQ(start->focal->curve.size(), 24u);
@@ -83,8 +83,8 @@ TEST(FindStartAndFocal, RollDoesNotTell) {
   const auto start = FindStartAndFocal(s.recording, SeenAt(s), {}, {});
   ASSERT_TRUE(start) << start.error().message;
   EXPECT_FALSE(start->focal->determined);
-  EXPECT_EQ(start->focal->value_px, 450.0);
-  EXPECT_THAT(start->notes, ::testing::Contains(HasSubstr("does not determine the focal length")));
+  EXPECT_NEAR(start->focal->value_px, 450.0, 1e-9);
+  EXPECT_THAT(start->notes, ::testing::Contains(HasSubstr("the focal length is not determined")));
 }
 
 TEST(FindStartAndFocal, RefusesWithTheReasonOfTheStart) {
