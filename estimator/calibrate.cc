@@ -173,7 +173,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   PairGraphOptions graph_options = options.window.graph;
   graph_options.residual = options.residual;
   graph_options.match_noise = recording.match_noise;
-  graph_options.gyro_sigma_rad_s = GyroSigma(recording);
+  graph_options.gyro_sigma_rad_s = GyroSigma(recording, start->delay_middle_row_s);
   if (recording.gyro_info.random_walk_rad_s2_rtHz) {
     graph_options.bias_walk_rad_s2_rtHz =
         std::max(1e-6, *recording.gyro_info.random_walk_rad_s2_rtHz);

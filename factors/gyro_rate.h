@@ -17,15 +17,16 @@ namespace camgyro {
 //             Evans writes the bias with the opposite sign.)
 class GyroRate final : public ceres::CostFunction {
  public:
-  // measured: one reading per column [rad/s]; sigma_rad_s > 0: white noise of one reading.
-  GyroRate(const Eigen::Matrix3Xd& measured_rad_s, double sigma_rad_s);
+  // measured: one reading per column [rad/s]; sigma_rad_s > 0: white noise of one
+  // reading, per axis.
+  GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d& sigma_rad_s);
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
   const Eigen::Matrix3Xd measured_;
-  const double inv_sigma_;
+  const Eigen::Vector3d inv_sigma_;
 };
 
 }  // namespace camgyro

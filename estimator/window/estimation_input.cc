@@ -1,8 +1,10 @@
 #include "estimator/window/estimation_input.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "core/robust_statistics.h"
 #include "core/time.h"
 
 namespace camgyro {
@@ -43,23 +45,29 @@ EstimationInput MakeEstimationInput(const Recording& recording, int attitude_gap
   return input;
 }
 
-double GyroSigma(const Recording& recording) {
+Eigen::Vector3d GyroSigma(const Recording& recording, double delay_s) {
   const double interval = MedianInterval(recording.gyro);
   if (recording.gyro_info.noise_density_rad_s_rtHz && interval > 0.0) {
-    return *recording.gyro_info.noise_density_rad_s_rtHz / std::sqrt(interval);
+    return Eigen::Vector3d::Constant(*recording.gyro_info.noise_density_rad_s_rtHz /
+                                     std::sqrt(interval));
   }
-  std::vector<double> differences;
+  std::array<std::vector<double>, 3> differences;
   const auto& gyro = recording.gyro;
+  const int64_t first = StampAt(recording.frames.front().stamp_ns, delay_s);
+  const int64_t last = StampAt(recording.frames.back().stamp_ns, delay_s);
   for (size_t i = 3; i < gyro.size(); ++i) {
+    if (gyro[i - 3].stamp_ns < first || gyro[i].stamp_ns > last) continue;
     const Eigen::Vector3d d = gyro[i].omega_gyro_rad_s - 3.0 * gyro[i - 1].omega_gyro_rad_s +
                               3.0 * gyro[i - 2].omega_gyro_rad_s - gyro[i - 3].omega_gyro_rad_s;
-    for (int k = 0; k < 3; ++k) differences.push_back(std::abs(d[k]));
+    for (size_t k = 0; k < 3; ++k) differences[k].push_back(d[static_cast<int>(k)]);
   }
-  if (differences.empty()) return 0.003;
-  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-  std::nth_element(differences.begin(), middle, differences.end());
+  Eigen::Vector3d sigma;
   // Third differences of white noise have a variance of 1 + 9 + 9 + 1.
-  return std::clamp(1.4826 * *middle / std::sqrt(20.0), 5e-4, 2e-2);
+  for (int k = 0; k < 3; ++k) {
+    sigma[k] = std::clamp(RobustScale({differences[static_cast<size_t>(k)]}, 0) / std::sqrt(20.0),
+                          5e-4, 2e-2);
+  }
+  return sigma;
 }
 
 }  // namespace camgyro

@@ -29,9 +29,10 @@ struct EstimationInput {
 // apart. What is absent gives no pairs.
 EstimationInput MakeEstimationInput(const Recording& recording, int attitude_gap = 1);
 
-// Standard deviation of the gyro's white noise per sample [rad/s]: as declared, else from the
-// differences between neighbouring samples (third differences; robust), within [5e-4, 2e-2].
-double GyroSigma(const Recording& recording);
+// White noise of one gyro sample per axis [rad/s]: as declared, else what the samples show while
+// the camera ran (third differences, robust), within [5e-4, 2e-2]. What vibration and sampling add
+// is not in it.
+Eigen::Vector3d GyroSigma(const Recording& recording, double delay_s);
 
 }  // namespace camgyro
 

@@ -25,7 +25,8 @@ struct PairGraphOptions {
   MatchNoise match_noise = MatchNoise::kBothImages;
   double sigma_px = 1.0;            // of the pairs added from now on
   double robust_threshold = 2.5;    // in sigmas; 0: none
-  double gyro_sigma_rad_s = 0.003;  // white noise of one sample (Jia & Evans section V.C)
+  // White noise of one gyro sample per axis (Jia & Evans section V.C); see GyroSigma.
+  Eigen::Vector3d gyro_sigma_rad_s = Eigen::Vector3d::Constant(0.003);
   double bias_walk_rad_s2_rtHz = 1e-4;
   double bias_interval_s = 1.0;  // one bias block for each interval
   // Samples kept on both sides of a pair, so that delay and readout can move in a solve. Beyond,

@@ -9,16 +9,16 @@ namespace {
 
 // Measured = true + bias + noise: at the truth the residual is minus the noise, in sigmas.
 TEST(GyroRate, ResidualIsMinusTheNoiseInSigmas) {
-  const Eigen::Vector3d bias(0.01, -0.02, 0.03), noise(0.003, -0.006, 0.0);
+  const Eigen::Vector3d bias(0.01, -0.02, 0.03), noise(0.003, -0.006, -0.006);
   Eigen::Matrix3Xd truth(3, 2);
   truth << 1, 2, 3, 4, 5, 6;
   Eigen::Matrix3Xd measured = truth.colwise() + bias;
   measured.col(1) += noise;
-  const GyroRate factor(measured, 0.003);
+  const GyroRate factor(measured, {0.003, 0.003, 0.006});
   Eigen::Matrix<double, 6, 1> r = Eigen::Matrix<double, 6, 1>::Constant(std::nan(""));
   const double* parameters[] = {truth.data(), bias.data()};
   ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
-  EXPECT_LT((r - (Eigen::Matrix<double, 6, 1>() << 0, 0, 0, -1, 2, 0).finished()).norm(), 1e-10);
+  EXPECT_LT((r - (Eigen::Matrix<double, 6, 1>() << 0, 0, 0, -1, 2, 1).finished()).norm(), 1e-10);
   Eigen::Vector3d b = bias;
   ExpectJacobiansMatchDifferences(factor, {truth.data(), b.data()}, 1e-6);
 }
