@@ -36,7 +36,9 @@ video: {format: mp4}
 class WriteRecordingTest : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::path(testing::TempDir()) / "write_recording_test";
+    // One folder per test: ctest runs them at the same time.
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    root_ = fs::path(testing::TempDir()) / (std::string("camgyro_write_") + test->name());
     fs::remove_all(root_);
     fs::create_directories(root_);
   }
