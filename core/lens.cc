@@ -31,8 +31,8 @@ Distortion DistortRadTan(const Eigen::Vector2d& xy, const LensParameters& lens) 
 // method; derivatives of the inverse follow from the implicit function theorem.
 class PinholeRadTan final : public Lens {
  public:
-  bool Unproject(const Eigen::Vector2d& px, const LensParameters& lens,
-                 RayJet* out) const override {
+  bool Unproject(const Eigen::Vector2d& px, const LensParameters& lens, RayJet* out,
+                 bool derivatives_by_lens) const override {
     const double f = lens[kFocal], aspect = lens[kAspect];
     const double fx = f * aspect;
     const Eigen::Vector2d distorted((px.x() - lens[kCx]) / fx, (px.y() - lens[kCy]) / f);
@@ -54,6 +54,11 @@ class PinholeRadTan final : public Lens {
     if (!xy.allFinite()) return false;
 
     const double x = xy.x(), y = xy.y(), r2 = xy.squaredNorm();
+    out->ray << x, y, 1.0;
+    out->J_ray_px.topRows<2>() = d.J.inverse() * Eigen::Vector2d(1.0 / fx, 1.0 / f).asDiagonal();
+    out->J_ray_px.row(2).setZero();
+    if (!derivatives_by_lens) return true;
+
     const double k1 = lens[kK1], k2 = lens[kK2], p1 = lens[kP1], p2 = lens[kP2];
     const double slope = k1 + 2.0 * k2 * r2, curvature = 2.0 * k2;
     const Eigen::Matrix2d J_inv = d.J.inverse();
@@ -85,10 +90,7 @@ class PinholeRadTan final : public Lens {
     value_by.col(kP1) << 2.0 * x * y, r2 + 2.0 * y * y;
     value_by.col(kP2) << r2 + 2.0 * x * x, 2.0 * x * y;
 
-    out->ray << x, y, 1.0;
-    out->J_ray_px.setZero();
-    out->J_ray_px.topRows<2>() = J_inv * scale;
-    out->J_ray_lens.setZero();
+    out->J_ray_lens.row(2).setZero();
     for (int k = 0; k < kLensSize; ++k) {
       const Eigen::Vector2d xy_k = J_inv * (distorted_by.col(k) - value_by.col(k));
       out->J_ray_lens.col(k).head<2>() = xy_k;
@@ -102,7 +104,7 @@ class PinholeRadTan final : public Lens {
       Eigen::Matrix2d scale_k = Eigen::Matrix2d::Zero();
       if (k == kFocal) scale_k = -scale / f;
       if (k == kAspect) scale_k(0, 0) = -scale(0, 0) / aspect;
-      out->J_ray_px_lens[k].setZero();
+      out->J_ray_px_lens[k].row(2).setZero();
       out->J_ray_px_lens[k].topRows<2>() = J_inv * (scale_k - J_k * J_inv * scale);
     }
     return true;

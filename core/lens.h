@@ -27,9 +27,9 @@ LensParameters MakePinhole(double focal_px, const Eigen::Vector2d& principal_px,
 
 // A ray and its derivatives. Only the direction of `ray` has a meaning; its third component is 1.
 struct RayJet {
-  Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();
-  Eigen::Matrix<double, 3, 2> J_ray_px = Eigen::Matrix<double, 3, 2>::Zero();
-  Eigen::Matrix<double, 3, kLensSize> J_ray_lens = Eigen::Matrix<double, 3, kLensSize>::Zero();
+  Eigen::Vector3d ray;
+  Eigen::Matrix<double, 3, 2> J_ray_px;
+  Eigen::Matrix<double, 3, kLensSize> J_ray_lens;
   // Derivative of J_ray_px by each lens parameter.
   std::array<Eigen::Matrix<double, 3, 2>, kLensSize> J_ray_px_lens;
 };
@@ -38,10 +38,11 @@ class Lens {
  public:
   virtual ~Lens() = default;
 
-  // Ray of a pixel. False where the model has no ray (outside the invertible part of the
-  // distortion): the caller drops the observation.
+  // Ray of a pixel and its derivative by the pixel; the derivatives by the lens only on request.
+  // False where the model has no ray (outside the invertible part of the distortion): the caller
+  // drops the observation.
   [[nodiscard]] virtual bool Unproject(const Eigen::Vector2d& px, const LensParameters& lens,
-                                       RayJet* ray) const = 0;
+                                       RayJet* ray, bool derivatives_by_lens = true) const = 0;
 
   // Pixel of a point in the camera frame; nothing for points behind the camera.
   [[nodiscard]] virtual std::optional<Eigen::Vector2d> Project(

@@ -7,8 +7,8 @@ namespace camgyro {
 bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
                      const ShutterParameters& shutter, const Eigen::Matrix3d& R_gyro_cam,
                      const RotationChain& chain, double frame_time_s, double height_px,
-                     const Eigen::Vector2d& px, Bearing* b) {
-  if (!lens_model.Unproject(px, lens, &b->lens_ray)) return false;
+                     const Eigen::Vector2d& px, Bearing* b, bool derivatives) {
+  if (!lens_model.Unproject(px, lens, &b->lens_ray, derivatives)) return false;
   b->row_fraction = px.y() / height_px;
   b->line_delay_s = shutter[kReadout] / height_px;
   b->rotation = chain.At(RowTimeGyroS(frame_time_s, shutter, px.y(), height_px));

@@ -45,12 +45,12 @@ struct PairGradient {
   Eigen::RowVector3d by_rotation = Eigen::RowVector3d::Zero();  // right perturbation of q_gyro_cam
 };
 
-// False where the lens has no ray for this pixel.
+// False where the lens has no ray for this pixel. Backpropagate needs `derivatives`.
 [[nodiscard]] bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
                                    const ShutterParameters& shutter,
                                    const Eigen::Matrix3d& R_gyro_cam, const RotationChain& chain,
                                    double frame_time_s, double height_px, const Eigen::Vector2d& px,
-                                   Bearing* bearing);
+                                   Bearing* bearing, bool derivatives = true);
 
 // Adds to `gradient` and `by_rates` (3 x chain.size()) the derivative of a scalar, given its
 // derivatives by ray_ref and by J_ray_px of one bearing.

@@ -29,7 +29,8 @@ bool CoplanarityDeterminant::Evaluate(double const* const* parameters, double* r
   const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + kFirstRateGroup);
   const RotationChain chain(pair.rate_times_s, rates);
   PairBearings bearings;
-  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2], &bearings)) {
+  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],
+                            jacobians != nullptr, &bearings)) {
     return false;
   }
   const double var_a = pair.variance_a(), var_b = pair.variance_b();

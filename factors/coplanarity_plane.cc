@@ -51,7 +51,8 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
   const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + kFirstRateGroup);
   const RotationChain chain(pair.rate_times_s, rates);
   PairBearings bearings;
-  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2], &bearings)) {
+  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],
+                            jacobians != nullptr, &bearings)) {
     return false;
   }
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);

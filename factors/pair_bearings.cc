@@ -6,7 +6,7 @@ namespace camgyro {
 
 bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
                           const double* lens, const double* shutter, const double* q_gyro_cam,
-                          PairBearings* bearings) {
+                          bool derivatives, PairBearings* bearings) {
   const LensParameters lens_parameters = Eigen::Map<const LensParameters>(lens);
   const ShutterParameters shutter_parameters = Eigen::Map<const ShutterParameters>(shutter);
   const Eigen::Matrix3d R_gyro_cam =
@@ -16,9 +16,11 @@ bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chai
   bearings->b.resize(n);
   for (size_t i = 0; i < n; ++i) {
     if (!EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
-                         pair.time_a_s, pair.height_px, pair.matches[i].px_a, &bearings->a[i]) ||
+                         pair.time_a_s, pair.height_px, pair.matches[i].px_a, &bearings->a[i],
+                         derivatives) ||
         !EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
-                         pair.time_b_s, pair.height_px, pair.matches[i].px_b, &bearings->b[i])) {
+                         pair.time_b_s, pair.height_px, pair.matches[i].px_b, &bearings->b[i],
+                         derivatives)) {
       return false;
     }
   }

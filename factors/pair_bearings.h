@@ -38,10 +38,12 @@ struct PairBearings {
   std::vector<Bearing> a, b;
 };
 
-// Evaluates both bearings of every match; false where the lens has no ray.
+// Evaluates both bearings of every match; false where the lens has no ray. PairRow needs
+// `derivatives`.
 [[nodiscard]] bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
                                         const double* lens, const double* shutter,
-                                        const double* q_gyro_cam, PairBearings* bearings);
+                                        const double* q_gyro_cam, bool derivatives,
+                                        PairBearings* bearings);
 
 // The rates of all groups as columns.
 Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* const* groups);

@@ -12,32 +12,35 @@
 
 namespace camgyro {
 
-RelativeRotation::RelativeRotation(Measurement measurement) : m_(std::move(measurement)) {
-  CHECK_GT(m_.sigma_rad, 0.0);
-  CHECK_GE(m_.rate_times_s.size(), 2u);
+RelativeRotation::RelativeRotation(std::shared_ptr<const Measurement> measurement)
+    : measurement_(std::move(measurement)) {
+  const Measurement& m = *measurement_;
+  CHECK_GT(m.sigma_rad, 0.0);
+  CHECK_GE(m.rate_times_s.size(), 2u);
   set_num_residuals(3);
   *mutable_parameter_block_sizes() = {kShutterSize, 4};
-  for (const int size : m_.rate_group_sizes) mutable_parameter_block_sizes()->push_back(3 * size);
+  for (const int size : m.rate_group_sizes) mutable_parameter_block_sizes()->push_back(3 * size);
 }
 
 bool RelativeRotation::Evaluate(double const* const* parameters, double* residuals,
                                 double** jacobians) const {
-  const RotationChain chain(m_.rate_times_s,
-                            GatherRates(m_.rate_group_sizes, parameters + kFirstRateGroup));
-  const double shift = parameters[0][kDelay] + m_.row_fraction * parameters[0][kReadout];
-  const RotationChain::State a = chain.At(m_.time_a_s + shift);
-  const RotationChain::State b = chain.At(m_.time_b_s + shift);
+  const Measurement& m = *measurement_;
+  const RotationChain chain(m.rate_times_s,
+                            GatherRates(m.rate_group_sizes, parameters + kFirstRateGroup));
+  const double shift = parameters[0][kDelay] + m.row_fraction * parameters[0][kReadout];
+  const RotationChain::State a = chain.At(m.time_a_s + shift);
+  const RotationChain::State b = chain.At(m.time_b_s + shift);
   const Eigen::Matrix3d R_gyro_cam =
       Eigen::Map<const Eigen::Quaterniond>(parameters[1]).normalized().toRotationMatrix();
-  const Eigen::Matrix3d R_a_b = m_.q_a_b.toRotationMatrix();
+  const Eigen::Matrix3d R_a_b = m.q_a_b.toRotationMatrix();
   const Eigen::Matrix3d error =
       b.R_ref_gyro.transpose() * a.R_ref_gyro * R_gyro_cam * R_a_b * R_gyro_cam.transpose();
   const Eigen::Vector3d log_error = Log(Eigen::Quaterniond(error));
   Eigen::Matrix3d robust = Eigen::Matrix3d::Zero();
   for (int i = 0; i < 3; ++i) {
-    const RobustResidual r = Robustify(log_error[i] / m_.sigma_rad, m_.robust_threshold);
+    const RobustResidual r = Robustify(log_error[i] / m.sigma_rad, m.robust_threshold);
     residuals[i] = r.value;
-    robust(i, i) = r.derivative / m_.sigma_rad;
+    robust(i, i) = r.derivative / m.sigma_rad;
   }
   if (jacobians == nullptr) return true;
 
@@ -46,11 +49,10 @@ bool RelativeRotation::Evaluate(double const* const* parameters, double* residua
   const Eigen::Matrix3d J_phi_a =
       robust * LeftJacobianInverse(log_error) * b.R_ref_gyro.transpose();
   if (jacobians[0] != nullptr) {
-    const Eigen::Vector3d by_shift =
-        J_phi_a * (a.PhiPerSecond() - b.PhiPerSecond());
+    const Eigen::Vector3d by_shift = J_phi_a * (a.PhiPerSecond() - b.PhiPerSecond());
     Eigen::Map<Eigen::Matrix<double, 3, kShutterSize, Eigen::RowMajor>> J(jacobians[0]);
     J.col(kDelay) = by_shift;
-    J.col(kReadout) = m_.row_fraction * by_shift;
+    J.col(kReadout) = m.row_fraction * by_shift;
   }
   if (jacobians[1] != nullptr) {
     const Eigen::Matrix3d J_rotation = robust * RightJacobianInverse(log_error) * R_gyro_cam *
@@ -65,8 +67,8 @@ bool RelativeRotation::Evaluate(double const* const* parameters, double* residua
     chain.AddRateGradient(a, by_phi, Eigen::Vector3d::Zero(), by_rates);
     chain.AddRateGradient(b, -by_phi, Eigen::Vector3d::Zero(), by_rates);
     int column = 0;
-    for (size_t g = 0; g < m_.rate_group_sizes.size(); ++g) {
-      const int size = m_.rate_group_sizes[g];
+    for (size_t g = 0; g < m.rate_group_sizes.size(); ++g) {
+      const int size = m.rate_group_sizes[g];
       if (double* J = jacobians[kFirstRateGroup + g]) {
         Eigen::Map<Eigen::Matrix3Xd>(J + 3 * size * i, 3, size) = by_rates.middleCols(column, size);
       }

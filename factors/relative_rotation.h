@@ -5,6 +5,7 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <vector>
 
 namespace camgyro {
@@ -31,7 +32,7 @@ class RelativeRotation final : public ceres::CostFunction {
     std::vector<int> rate_group_sizes;
   };
 
-  explicit RelativeRotation(Measurement measurement);
+  explicit RelativeRotation(std::shared_ptr<const Measurement> measurement);
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
@@ -39,7 +40,7 @@ class RelativeRotation final : public ceres::CostFunction {
   static constexpr int kFirstRateGroup = 2;
 
  private:
-  const Measurement m_;
+  const std::shared_ptr<const Measurement> measurement_;
 };
 
 }  // namespace camgyro

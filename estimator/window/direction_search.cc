@@ -47,7 +47,7 @@ Refined Refine(const PairBearings& bearings, double variance_a, double variance_
                Vector3d tau) {
   double cost = Cost(bearings, variance_a, variance_b, threshold, tau, 1);
   double damping = 1e-3;
-  for (int iteration = 0; iteration < 15; ++iteration) {
+  for (int iteration = 0; iteration < 8; ++iteration) {
     const Vector3d u = tau.unitOrthogonal(), v = tau.cross(u);
     Eigen::Matrix<double, 3, 2> basis;
     basis << u, v;
@@ -68,7 +68,7 @@ Refined Refine(const PairBearings& bearings, double variance_a, double variance_
     const Vector3d candidate = (tau + basis * step).normalized();
     const double candidate_cost = Cost(bearings, variance_a, variance_b, threshold, candidate, 1);
     if (candidate_cost < cost) {
-      const bool converged = cost - candidate_cost < 1e-9 * cost;
+      const bool converged = cost - candidate_cost < 1e-5 * cost;
       tau = candidate;
       cost = candidate_cost;
       damping = std::max(1e-9, 0.2 * damping);
@@ -96,8 +96,8 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
                              .cross(bearings.a[j].ray_ref.cross(bearings.b[j].ray_ref));
     if (tau.norm() > 1e-14) candidates.push_back(tau.normalized());
   }
-  // A third of the matches ranks the candidates well enough; the refinement uses them all.
-  const size_t stride = n > 90 ? 3 : (n > 40 ? 2 : 1);
+  // Some 30 matches rank the candidates well enough; the refinement uses them all.
+  const size_t stride = std::max<size_t>(1, n / 30);
   std::vector<std::pair<double, size_t>> ranked;
   for (size_t c = 0; c < candidates.size(); ++c) {
     ranked.emplace_back(

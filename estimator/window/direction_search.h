@@ -18,7 +18,7 @@ struct DirectionEstimate {
 
 // Minimises the robust plane residuals over the unit sphere: cost on a fixed grid of directions
 // and at the cross products of some pairs of matches, then Gauss-Newton with the derivative of
-// sigma from the best three. Deterministic.
+// sigma from the best three, to the accuracy that a joint solve can start from. Deterministic.
 DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
                                 double robust_threshold);
 

@@ -177,7 +177,8 @@ AddPairResult PairGraph::AddPair(int64_t id, double time_a_s, double time_b_s,
   m.lens = &GetLens(prior_mean_.distortion_model);
   RayJet ray;
   for (const Match& match : matches) {
-    if (m.lens->Unproject(match.px_a, lens, &ray) && m.lens->Unproject(match.px_b, lens, &ray)) {
+    if (m.lens->Unproject(match.px_a, lens, &ray, false) &&
+        m.lens->Unproject(match.px_b, lens, &ray, false)) {
       m.matches.push_back(match);
     }
   }
@@ -221,7 +222,8 @@ AddPairResult PairGraph::AddRotation(int64_t id, double time_a_s, double time_b_
   const double delay = graph_.value(kShutterBlock)[kDelay];
   Pair pair;
   pair.time_s = time_a_s;
-  RelativeRotation::Measurement m;
+  pair.rotation = std::make_shared<RelativeRotation::Measurement>();
+  RelativeRotation::Measurement& m = *pair.rotation;
   const AddPairResult covered = CoverWithRates(time_a_s + delay - options_.rate_margin_s,
                                                time_b_s + delay + options_.rate_margin_s,
                                                &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
@@ -233,7 +235,7 @@ AddPairResult PairGraph::AddRotation(int64_t id, double time_a_s, double time_b_
   m.robust_threshold = options_.robust_threshold;
   std::vector<BlockId> blocks = {kShutterBlock, kRotationBlock};
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
-  pair.factor = graph_.AddFactor(std::make_shared<RelativeRotation>(std::move(m)), blocks);
+  pair.factor = graph_.AddFactor(std::make_shared<RelativeRotation>(pair.rotation), blocks);
   pairs_.emplace(id, std::move(pair));
   return AddPairResult::kAdded;
 }
@@ -277,6 +279,16 @@ void PairGraph::ForgetOldRates() {
   }
 }
 
+void PairGraph::SetSigma(int64_t id, double sigma) {
+  CHECK_GT(sigma, 0.0);
+  const Pair& pair = pairs_.at(id);
+  if (pair.measurement != nullptr) {
+    pair.measurement->sigma_px = sigma;
+  } else {
+    pair.rotation->sigma_rad = sigma;
+  }
+}
+
 std::vector<int64_t> PairGraph::pair_ids() const {
   std::vector<int64_t> ids;
   for (const auto& entry : pairs_) ids.push_back(entry.first);
@@ -306,7 +318,7 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const std::vector<const double*> p = PairParameters(pair);
   const RotationChain chain(m.rate_times_s, GatherRates(m.rate_group_sizes, p.data() + 3));
   PairBearings bearings;
-  if (!EvaluatePairBearings(m, chain, p[0], p[1], p[2], &bearings)) return residuals;
+  if (!EvaluatePairBearings(m, chain, p[0], p[1], p[2], false, &bearings)) return residuals;
   if (search || options_.residual != ResidualKind::kPlane) {
     const DirectionEstimate direction =
         FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold);

@@ -14,6 +14,7 @@
 #include "core/recording.h"
 #include "estimator/window/factor_graph.h"
 #include "factors/pair_bearings.h"
+#include "factors/relative_rotation.h"
 
 namespace camgyro {
 
@@ -78,9 +79,8 @@ class PairGraph {
   // Whitened residuals of a pair at the present estimate, without loss. Plane: with its direction
   // minimised anew when `search` is set (and stored). Empty if a ray is missing.
   std::vector<double> Residuals(int64_t id, bool search);
-  double sigma_px(int64_t id) const { return pairs_.at(id).measurement->sigma_px; }
-  // Sets the pixel noise of a pair already in the graph.
-  void SetSigmaPx(int64_t id, double sigma_px) { pairs_.at(id).measurement->sigma_px = sigma_px; }
+  // Sets the noise of a pair already in the graph: pixels, or radians of a rotation.
+  void SetSigma(int64_t id, double sigma);
   PairGraphOptions* options() { return &options_; }
 
   // The estimate. With covariance: of the present graph, inflated by the clustered (sandwich)
@@ -99,7 +99,9 @@ class PairGraph {
     FactorGraph::FactorKey factor = 0;
   };
   struct Pair {
-    std::shared_ptr<PairMeasurement> measurement;  // null for rotations
+    // Shared with the factor, which reads the noise at every evaluation. One of the two is null.
+    std::shared_ptr<PairMeasurement> measurement;
+    std::shared_ptr<RelativeRotation::Measurement> rotation;
     std::vector<int64_t> groups;
     FactorGraph::FactorKey factor = 0;
     double time_s = 0.0;

@@ -1,7 +1,9 @@
 #include "frontend/readers/folder_reader.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -77,7 +79,7 @@ Status AddVideo(const CameraFiles& files, Recording* recording) {
   if (video->display_rotation_deg != 0) {
     recording->notes.push_back(
         Concat(files.video, ": is to be shown rotated by ", video->display_rotation_deg,
-               " deg; rows are read out as coded, so the picture is used without that rotation"));
+               " deg clockwise; rows are read out as coded, so it is used without that rotation"));
   }
   return SetResolution(video->width_px, video->height_px, files.video, files.yaml,
                        &recording->camera);
@@ -100,6 +102,15 @@ Status AddFramesOfTables(const CameraFiles& files, Recording* recording) {
   stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
   for (const int64_t stamp_ns : stamps) recording->frames.emplace_back().stamp_ns = stamp_ns;
   return {};
+}
+
+// A note if sensor.yaml declares another rate than the stamps have, by more than a tenth.
+void NoteRate(const fs::path& part, std::optional<double> declared_hz, double interval_s,
+              Recording* recording) {
+  if (!declared_hz || std::abs(*declared_hz * interval_s - 1.0) < 0.1) return;
+  recording->notes.push_back(Concat((part / "sensor.yaml").string(), ": says rate_hz ",
+                                    *declared_hz, ", but the stamps of ", part.filename().string(),
+                                    " give ", 1.0 / interval_s, " Hz"));
 }
 
 Status ReadCamera(const fs::path& cam, Recording* recording) {
@@ -143,6 +154,7 @@ Status ReadCamera(const fs::path& cam, Recording* recording) {
                            MedianInterval(recording->frames) * 1e9,
                            " ns, too short for any camera; expected stamps in nanoseconds"));
   }
+  NoteRate(cam, yaml->rate_hz, MedianInterval(recording->frames), recording);
   if (recording->camera.width_px == 0 && (!files.tracks.empty() || !files.matches.empty())) {
     return BadInput(Concat(files.tracks.empty() ? files.matches : files.tracks,
                            ": the size of the pictures is needed to read pixels as rows in time; "
@@ -164,7 +176,9 @@ Status ReadImu(const fs::path& imu, Recording* recording) {
   if (recording->camera.q_gyro_cam && yaml->q_body_sensor) {
     recording->camera.q_gyro_cam = yaml->q_body_sensor->conjugate() * *recording->camera.q_gyro_cam;
   }
-  return ReadImuCsv((imu / "data.csv").string(), recording);
+  Status status = ReadImuCsv((imu / "data.csv").string(), recording);
+  if (status) NoteRate(imu, yaml->rate_hz, MedianInterval(recording->gyro), recording);
+  return status;
 }
 
 // A note if the stamps do not overlap: clocks may have different origins, which the delay search

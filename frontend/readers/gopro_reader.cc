@@ -1,7 +1,6 @@
 #include "frontend/readers/gopro_reader.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -19,8 +18,11 @@
 namespace camgyro {
 namespace {
 
+constexpr double kMostSamples = 1e10;        // a month of the fastest gyro
+constexpr double kShortestIntervalS = 1e-5;  // of any gyro
+
 struct Payload {
-  double start_s = 0.0, duration_s = 0.0;
+  double start_s = 0.0;
   GpmfPayload gpmf;
 };
 
@@ -32,16 +34,21 @@ Result<std::vector<Payload>> ReadPayloads(const std::string& file, const VideoCo
       return BadInput(Concat(file, ": telemetry payload ", payloads.size(),
                              " is malformed: ", gpmf.error().message));
     }
-    payloads.push_back({packet.start_s, packet.duration_s, std::move(*gpmf)});
+    payloads.push_back({packet.start_s, std::move(*gpmf)});
   }
   return payloads;
 }
 
-// What the camera says about its settings: the GPMF box beside the tracks, flattened to texts.
-std::map<std::string, std::string> ReadSettings(const std::string& file) {
-  std::map<std::string, std::string> settings;
+// What the camera says about its settings: the GPMF box beside the tracks, flattened.
+struct Settings {
+  std::map<std::string, std::string> texts;
+  std::optional<double> readout_ms;  // HERO8 and later; before, SROT stands in the telemetry
+};
+
+Settings ReadSettings(const std::string& file) {
+  Settings settings;
   if (const auto firmware = ReadMp4Box(file, {"moov", "udta", "FIRM"})) {
-    settings["FIRM"] = Trim(std::string(firmware->begin(), firmware->end()).c_str());
+    settings.texts["FIRM"] = Trim(std::string(firmware->begin(), firmware->end()).c_str());
   }
   const auto box = ReadMp4Box(file, {"moov", "udta", "GPMF"});
   if (!box) return settings;
@@ -52,7 +59,10 @@ std::map<std::string, std::string> ReadSettings(const std::string& file) {
     if (!items) continue;  // settings are extras: the telemetry itself stands without them
     for (const GpmfItem& item : *items) {
       if (item.type == 0) levels.push_back(item.value);
-      if (item.type == 'c') settings.emplace(item.key, item.Text());
+      if (item.type == 'c') settings.texts.emplace(item.key, item.Text());
+      const std::vector<double> numbers =
+          item.key == "SROT" ? item.Numbers() : std::vector<double>();
+      if (!numbers.empty() && std::isfinite(numbers[0])) settings.readout_ms = numbers[0];
     }
   }
   return settings;
@@ -73,9 +83,10 @@ std::string ModelName(const std::map<std::string, std::string>& settings,
 // The order that a model stores its axes in without saying so (gpmf-parser's README). The HERO5's
 // is what later models refer to.
 std::string DefaultOrientation(const std::string& model) {
-  std::string upper = model;
-  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  return upper.find("HERO6") == std::string::npos ? "ZXY" : "YxZ";
+  if (model.find("HERO6") != std::string::npos || model.find("Hero6") != std::string::npos) {
+    return "YxZ";
+  }
+  return model.find("Fusion") != std::string::npos ? "yXZ" : "ZXY";
 }
 
 // The samples of one sensor through all payloads, on their clock.
@@ -110,24 +121,28 @@ Result<SensorSamples> CollectSamples(const std::vector<Payload>& payloads, const
 
   int64_t seen = 0;
   for (size_t i = 0; i < streams.size(); ++i) {
-    const auto samples = static_cast<int64_t>(streams[i]->samples);
     // TSMP counts samples of payloads that are missing from the file, too.
-    int64_t first = seen;
+    double first = static_cast<double>(seen);
     if (streams[i]->total_samples && streams[0]->total_samples) {
-      first = std::llround(*streams[i]->total_samples - *streams[0]->total_samples) - samples +
-              static_cast<int64_t>(streams[0]->samples);
+      first = *streams[i]->total_samples - *streams[0]->total_samples +
+              static_cast<double>(streams[0]->samples) - static_cast<double>(streams[i]->samples);
     }
-    if (first < seen) return BadInput(Concat(key, ": sample counts (TSMP) go back"));
+    if (!(first >= static_cast<double>(seen) && first < kMostSamples)) {
+      return BadInput(Concat(key, ": sample counts (TSMP) go back or are out of range"));
+    }
     // The camera's own stamps are better than the payloads' times, but have another origin.
     const double start_s =
         stamped ? payload_starts_s[0] + 1e-6 * (*streams[i]->stamp_us - *streams[0]->stamp_us)
                 : payload_starts_s[i];
-    lumps.push_back({first, start_s});
+    lumps.push_back({std::llround(first), start_s});
     sensor.counts.push_back(streams[i]->samples);
-    seen = first + samples;
+    seen = lumps.back().first_sample + static_cast<int64_t>(streams[i]->samples);
   }
   const auto clock = FitSampleClock(lumps);
   if (!clock) return BadInput(Concat(key, ": ", clock.error().message));
+  if (clock->interval_s < kShortestIntervalS) {
+    return BadInput(Concat(key, ": a rate of ", 1.0 / clock->interval_s, " Hz is not plausible"));
+  }
   sensor.clock = *clock;
 
   sensor.unit = streams[0]->unit;
@@ -162,8 +177,7 @@ std::vector<double> CollectScalars(const std::vector<Payload>& payloads, const s
   return values;
 }
 
-void NoteGyroClock(const SensorSamples& gyro, const std::vector<Payload>& payloads,
-                   Recording* recording) {
+void NoteGyroClock(const SensorSamples& gyro, Recording* recording) {
   recording->notes.push_back(
       Concat("gyro clock: ", gyro.stamps_ns.size(), " samples of ", gyro.counts.size(),
              " telemetry payloads laid on one line of ", 1.0 / gyro.clock.interval_s,
@@ -179,15 +193,15 @@ void NoteGyroClock(const SensorSamples& gyro, const std::vector<Payload>& payloa
     if (std::abs(static_cast<double>(gyro.counts[i]) - usual) > 0.05 * usual) {
       recording->notes.push_back(Concat(
           "telemetry payload ", i, " has ", gyro.counts[i], " gyro samples, others ", usual,
-          ": its time is ambiguous by ",
+          ": when it starts is uncertain by about ",
           1e3 * gyro.clock.interval_s * std::abs(static_cast<double>(gyro.counts[i]) - usual),
-          " ms; the delay between camera and gyro takes this up"));
+          " ms"));
     }
   }
-  const double telemetry_end_s = payloads.back().start_s + payloads.back().duration_s;
+  const double gyro_end_s = SecondsSince(0, gyro.stamps_ns.back());
   const double video_end_s = SecondsSince(0, recording->frames.back().stamp_ns);
-  if (telemetry_end_s < video_end_s) {
-    recording->notes.push_back(Concat("telemetry ends at ", telemetry_end_s,
+  if (gyro_end_s < video_end_s) {
+    recording->notes.push_back(Concat("the gyro ends at ", gyro_end_s,
                                       " s, the video's last frame is at ", video_end_s, " s"));
   }
 }
@@ -232,8 +246,8 @@ Result<Recording> ReadGoPro(const std::string& file) {
   }
   const auto payloads = ReadPayloads(file, *video);
   if (!payloads) return tl::unexpected(payloads.error());
-  const std::map<std::string, std::string> settings = ReadSettings(file);
-  const std::string model = ModelName(settings, payloads->front().gpmf.device_name);
+  const Settings settings = ReadSettings(file);
+  const std::string model = ModelName(settings.texts, payloads->front().gpmf.device_name);
 
   const auto gyro = CollectSamples(*payloads, "GYRO", DefaultOrientation(model));
   const auto accel = CollectSamples(*payloads, "ACCL", DefaultOrientation(model));
@@ -267,15 +281,16 @@ Result<Recording> ReadGoPro(const std::string& file) {
     return tl::unexpected(unit.error());
   }
 
-  const auto view = settings.find("VFOV");
+  const auto view = settings.texts.find("VFOV");
   recording.notes.push_back(Concat(
-      "GoPro ", model, view == settings.end() ? "" : ", field of view (VFOV) " + view->second,
+      "GoPro ", model, view == settings.texts.end() ? "" : ", field of view (VFOV) " + view->second,
       ", gyro axes ", gyro->orientation,
       gyro->orientation_stated ? " (ORIN)" : " (the model's; the file does not say)"));
-  NoteGyroClock(*gyro, *payloads, &recording);
+  NoteGyroClock(*gyro, &recording);
   SetExposures(CollectScalars(*payloads, "SHUT"), &recording);
-  SetStabilisation(settings, &recording);
+  SetStabilisation(settings.texts, &recording);
   std::vector<double> readouts_ms = CollectScalars(*payloads, "SROT");
+  if (settings.readout_ms) readouts_ms = {*settings.readout_ms};
   if (!readouts_ms.empty()) {
     const auto middle = readouts_ms.begin() + static_cast<std::ptrdiff_t>(readouts_ms.size() / 2);
     std::nth_element(readouts_ms.begin(), middle, readouts_ms.end());
@@ -284,7 +299,7 @@ Result<Recording> ReadGoPro(const std::string& file) {
   if (video->display_rotation_deg != 0) {
     recording.notes.push_back(Concat("the video is to be shown rotated by ",
                                      video->display_rotation_deg,
-                                     " deg; it is used without that rotation"));
+                                     " deg clockwise; it is used without that rotation"));
   }
   return recording;
 }

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstring>
 
 #include "frontend/readers/text.h"
@@ -74,6 +75,12 @@ double Element(char type, const uint8_t* bytes) {
   }
 }
 
+// The first of several texts of equal length; one text may be written as many single characters.
+std::string FirstWord(const GpmfItem& item) {
+  const std::string text = item.Text();
+  return item.sample_size > 1 ? std::string(Trim(text.substr(0, item.sample_size))) : text;
+}
+
 // The samples of one STRM and what stands before them.
 Result<std::optional<GpmfStream>> ReadStream(ByteView bytes) {
   const auto items = ParseGpmf(bytes);
@@ -82,9 +89,7 @@ Result<std::optional<GpmfStream>> ReadStream(ByteView bytes) {
   std::vector<double> scale;
   for (const GpmfItem& item : *items) {
     if (item.key == "SCAL") scale = item.Numbers();
-    if (item.key == "SIUN" || item.key == "UNIT") {
-      stream.unit = Trim(item.Text().substr(0, item.sample_size));
-    }
+    if (item.key == "SIUN") stream.unit = FirstWord(item);
     if (item.key == "ORIN") stream.orientation = item.Text();
     const bool counter = item.key == "STMP" || item.key == "TSMP";
     const std::vector<double> numbers = counter ? item.Numbers() : std::vector<double>();
@@ -105,10 +110,11 @@ Result<std::optional<GpmfStream>> ReadStream(ByteView bytes) {
       return BadInput(
           Concat(item.key, " has ", scale.size(), " scales for ", stream.elements, " elements"));
     }
-    for (size_t i = 0; !scale.empty() && i < stream.values.size(); ++i) {
-      const double divisor = scale[scale.size() == 1 ? 0 : i % stream.elements];
-      if (divisor == 0.0) return BadInput(Concat(item.key, " has a scale of zero"));
-      stream.values[i] /= divisor;
+    for (size_t i = 0; i < stream.values.size(); ++i) {
+      if (!scale.empty()) stream.values[i] /= scale[scale.size() == 1 ? 0 : i % stream.elements];
+      if (!std::isfinite(stream.values[i])) {
+        return BadInput(Concat(item.key, " has a value that is not finite, or a scale of zero"));
+      }
     }
   }
   if (stream.key.empty()) return std::optional<GpmfStream>();
@@ -144,6 +150,8 @@ Result<std::vector<GpmfItem>> ParseGpmf(ByteView bytes) {
     item.repeat = BigEndian(header + 6, 2);
     item.value = {header + kHeaderSize, item.sample_size * item.repeat};
     if (item.value.size > bytes.size - at - kHeaderSize) {
+      std::replace_if(
+          item.key.begin(), item.key.end(), [](unsigned char c) { return !std::isprint(c); }, '?');
       return BadInput(Concat("item '", item.key, "' needs ", item.value.size, " bytes, only ",
                              bytes.size - at - kHeaderSize, " are left"));
     }

@@ -67,12 +67,13 @@ Status ReadImuCsv(const std::string& file, Recording* recording) {
 
     if (!gyro.empty() && sample.stamp_ns <= gyro.back().stamp_ns) {
       const bool same = sample.stamp_ns == gyro.back().stamp_ns;
-      if (same && sample.omega_gyro_rad_s == gyro.back().omega_gyro_rad_s) {
+      if (same && sample.omega_gyro_rad_s == gyro.back().omega_gyro_rad_s &&
+          (csv.width() < 7 || accel.accel_gyro_m_s2 == recording->accel.back().accel_gyro_m_s2)) {
         ++repeated_rows;
         continue;
       }
       csv.Fail(Concat("timestamp ", sample.stamp_ns,
-                      same ? " repeats with other rates, after " : " goes back, after ",
+                      same ? " repeats with other values, after " : " goes back, after ",
                       gyro.back().stamp_ns, "; expected strictly increasing stamps"));
       break;
     }

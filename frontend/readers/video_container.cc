@@ -22,13 +22,12 @@ int DisplayRotationDeg(const AVStream& stream) {
   const uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
   if (matrix == nullptr) return 0;
   const double angle_deg = av_display_rotation_get(reinterpret_cast<const int32_t*>(matrix));
-  return std::isfinite(angle_deg) ? static_cast<int>(std::lround(angle_deg)) : 0;
+  return std::isfinite(angle_deg) ? static_cast<int>(std::lround(-angle_deg)) : 0;
 }
 
 }  // namespace
 
 Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file) {
-  // FFmpeg prints on its own otherwise (unknown streams of a GoPro file); errors are values here.
   av_log_set_level(AV_LOG_FATAL);
   AVFormatContext* context = nullptr;
   int code = avformat_open_input(&context, file.c_str(), nullptr, nullptr);
@@ -53,13 +52,14 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
   result.height_px = video.codecpar->height;
   result.display_rotation_deg = DisplayRotationDeg(video);
 
+  // Not nb_frames, which counts what an edit list leaves out, too.
+  const int listed = avformat_index_get_entries_count(&video);
   FfmpegPtr<AVPacket> packet(av_packet_alloc());
-  int64_t packets = 0;
+  int packets = 0;
   bool cut_short = false;
   int code = 0;
   while ((code = av_read_frame(context->get(), packet.get())) >= 0) {
     const AVStream& stream = *(*context)->streams[packet->stream_index];
-    const double unit_s = av_q2d(stream.time_base);
     if (packet->stream_index == video_index) {
       ++packets;
       cut_short = cut_short || (packet->flags & AV_PKT_FLAG_CORRUPT) != 0;
@@ -73,8 +73,7 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
             av_rescale_q(packet->pts, stream.time_base, AVRational{1, 1000000000}));
       }
     } else if (IsGpmf(stream) && packet->pts != AV_NOPTS_VALUE) {
-      result.gpmf.push_back({static_cast<double>(packet->pts) * unit_s,
-                             static_cast<double>(packet->duration) * unit_s,
+      result.gpmf.push_back({static_cast<double>(packet->pts) * av_q2d(stream.time_base),
                              {packet->data, packet->data + packet->size}});
     }
     av_packet_unref(packet.get());
@@ -83,9 +82,9 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
     return BadInput(
         Concat(file, ": reading stopped after ", packets, " frames (", FfmpegError(code), ")"));
   }
-  if (cut_short || packets < video.nb_frames) {
-    return BadInput(Concat(file, ": the file is cut short: its index lists ", video.nb_frames,
-                           " frames, ", packets, " were found whole"));
+  if (cut_short || packets < listed) {
+    return BadInput(Concat(file, ": the file is cut short: its index lists ", listed, " frames, ",
+                           packets, " were found whole"));
   }
   std::sort(result.stamps_ns.begin(), result.stamps_ns.end());  // packets come in coding order
   const auto repeated = std::adjacent_find(result.stamps_ns.begin(), result.stamps_ns.end());

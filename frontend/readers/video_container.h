@@ -12,13 +12,13 @@
 namespace camgyro {
 
 struct DataPacket {
-  double start_s = 0.0, duration_s = 0.0;  // from the container's time 0
+  double start_s = 0.0;  // from the container's time 0
   std::vector<uint8_t> bytes;
 };
 
 struct VideoContainer {
   int width_px = 0, height_px = 0;  // as coded; a rotation for display is not applied
-  int display_rotation_deg = 0;     // of the display matrix, counter-clockwise; 0 without one
+  int display_rotation_deg = 0;     // of the display matrix, clockwise; 0 without one
   std::vector<int64_t> stamps_ns;   // of the shown frames, from the container's time 0, increasing
   std::vector<DataPacket> gpmf;     // packets of a GoPro telemetry stream, in order
 };
@@ -27,7 +27,8 @@ struct VideoContainer {
 // short (fewer packets than its index lists), frames without or with repeated stamps.
 Result<VideoContainer> ReadVideoContainer(const std::string& file);
 
-// Opens a file and finds its streams.
+// Opens a file and finds its streams. Lowers FFmpeg's log level to fatal, for the whole process:
+// errors are values here, and GoPro files have streams that it would print warnings about.
 Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file);
 
 }  // namespace camgyro

@@ -1,10 +1,10 @@
-#include <ceres/ceres.h>
 #include <gmock/gmock.h>
 
 #include "factors/coplanarity_determinant.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/robust.h"
 #include "factors/rotation_manifold.h"
+#include "tests/factors/difference_check.h"
 #include "tests/factors/pair_scene.h"
 #include "tests/factors/reference_plane.h"
 
@@ -151,15 +151,7 @@ TEST(CoplanarityPlane, JacobianMatchesDifferencesWithTheLossOn) {
     Disturb(seed, &s);
     s.pair->robust_threshold = 1.7;  // many of the disturbed residuals are beyond
     const CoplanarityPlane factor(s.pair);
-    RotationManifold rotation;
-    std::vector<const ceres::Manifold*> manifolds(factor.parameter_block_sizes().size(), nullptr);
-    manifolds[2] = &rotation;
-    ceres::NumericDiffOptions options;
-    options.ridders_relative_initial_step_size = 1e-5;
-    const ceres::GradientChecker checker(&factor, &manifolds, options);
-    ceres::GradientChecker::ProbeResults results;
-    const auto parameters = s.Parameters();
-    EXPECT_TRUE(checker.Probe(parameters.data(), 1e-4, &results)) << results.error_log;
+    ExpectJacobiansMatchDifferences(factor, s.Parameters(), 1e-7);
   }
 }
 

@@ -1,12 +1,11 @@
 #include "factors/marginal_prior.h"
 
-#include <ceres/ceres.h>
 #include <gmock/gmock.h>
 
 #include <random>
 
 #include "core/so3.h"
-#include "factors/rotation_manifold.h"
+#include "tests/factors/difference_check.h"
 
 namespace camgyro {
 namespace {
@@ -45,14 +44,7 @@ TEST(MarginalPrior, JacobianMatchesDifferencesFarFromTheLinearisation) {
                               VectorXd::Ones(4));
     Eigen::Vector2d x(0.3, -0.4);
     Quaterniond q = q_lin * Exp(Vector3d(0.3, -0.3, 0.25));
-    RotationManifold rotation;
-    std::vector<const ceres::Manifold*> manifolds = {nullptr, &rotation};
-    ceres::NumericDiffOptions options;
-    options.ridders_relative_initial_step_size = 1e-5;
-    const ceres::GradientChecker checker(&prior, &manifolds, options);
-    ceres::GradientChecker::ProbeResults results;
-    const double* parameters[] = {x.data(), q.coeffs().data()};
-    EXPECT_TRUE(checker.Probe(parameters, 1e-7, &results)) << results.error_log;
+    ExpectJacobiansMatchDifferences(prior, {x.data(), q.coeffs().data()}, 1e-7);
   }
 }
 

@@ -47,7 +47,8 @@ template <typename T>
 void RayAndJacobian(const PairMeasurement& pair, const T* lens, const T* shutter, const T* q,
                     const std::vector<T>& rates, const Eigen::Vector2d& px, double stamp,
                     Vec3<T>* ray, Mat32<T>* J) {
-  const Vec2<T> target((T(px.x()) - lens[1]) / (lens[0] * lens[3]), (T(px.y()) - lens[2]) / lens[0]);
+  const Vec2<T> target((T(px.x()) - lens[1]) / (lens[0] * lens[3]),
+                       (T(px.y()) - lens[2]) / lens[0]);
   Vec2<T> p = target;  // fixed-point iteration of the undistortion, to convergence
   for (int i = 0; i < 200; ++i) p += target - Distort(lens, p);
   // Derivative of the distortion by differences: it is a polynomial of degree 5, for which the

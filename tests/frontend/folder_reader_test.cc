@@ -162,6 +162,17 @@ TEST(FolderReader, NotesClocksThatDoNotOverlap) {
                                     "1000000000 to 1066000000 ns, gyro from 5000000000")));
 }
 
+TEST(FolderReader, NotesARateThatTheStampsDoNotHave) {
+  const RecordingFolder folder;
+  folder.Write(TrackRecording());
+  folder.Write("imu0/sensor.yaml", "rate_hz: 200\n");  // stamps: 20 ms apart
+  const Result<Recording> recording = ReadRecording(folder.path());
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_THAT(recording->notes,
+              ElementsAre(HasSubstr("imu0/sensor.yaml: says rate_hz 200, but the stamps of imu0 "
+                                    "give 50 Hz")));
+}
+
 TEST(FolderReader, ComposesTheMountingOfCameraAndImu) {
   const RecordingFolder folder;
   folder.Write(TrackRecording());

@@ -1,0 +1,76 @@
+// The main job: start, online pass, refinement, and an honest account of what came out.
+#ifndef CAMGYRO_ESTIMATOR_CALIBRATE_H_
+#define CAMGYRO_ESTIMATOR_CALIBRATE_H_
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/recording.h"
+#include "core/result.h"
+#include "estimator/start/find_start.h"
+#include "estimator/start/focal_scan.h"
+#include "estimator/window/refinement.h"
+#include "estimator/window/sliding_window.h"
+
+namespace camgyro {
+
+// Called now and then with the stage ("start", "window", "refinement") and its done share 0..1.
+using Progress = std::function<void(const std::string& stage, double done)>;
+
+struct CalibrateOptions {
+  ResidualKind residual = ResidualKind::kPlane;
+  bool refine = true;  // false: the online estimate is the result
+  StartOptions start;
+  FocalScanOptions focal_scan;
+  SlidingWindowOptions window;
+  RefinementOptions refinement;
+};
+
+struct StageTime {
+  std::string stage;
+  double seconds = 0.0;
+};
+
+struct CalibrationReport {
+  Calibration calibration;  // the result
+  // The online pass alone; absent for recordings of attitudes.
+  std::optional<Calibration> online;
+  std::vector<WindowUpdate> trace;  // one per solved window
+  int pairs_used_online = 0;
+
+  StartResult start;
+  FitQuality quality;
+  // On blocks of frames that were set aside: a fit without them, evaluated on them. The result
+  // itself then uses all frames. Absent for short recordings and for attitudes.
+  std::optional<UnseenFit> unseen;
+  int skipped_pairs = 0;
+  bool converged = false;
+
+  std::vector<std::string> notes;   // what a user should know
+  std::vector<std::string> doubts;  // reasons not to believe a number
+  std::vector<StageTime> times;
+};
+
+// Calibrates a recording that has image motion (tracks, matches) or attitudes; pictures were
+// tracked before. `rotations_at`: camera rotations between frames at a trial focal length, found
+// from the pictures alone (frontend/two_view_rotation.h); not called for attitudes. Errors:
+// kCannotEstimate with the reason where the data do not determine a calibration.
+Result<CalibrationReport> CalibrateRecording(const Recording& recording,
+                                             const CameraRotationsAtFocal& rotations_at,
+                                             const CalibrateOptions& options,
+                                             const Progress& progress = nullptr);
+
+// The Gaussian prior of a calibration: what the files declare, with the spread that such
+// declarations have, or what phones are like where they declare nothing.
+//   f: 15 % around the declared one, 30 % around the scan's; c: 2 % of the diagonal around the
+//   centre; t_r: declared +- 5 ms, else half of the shorter of frame interval and 1/30 s, +- 60 %
+//   of that interval; t_d: +- 50 ms around the search's; b_g: 0 +- 0.1 rad/s; q_c: +- 0.15 rad
+//   around the search's.
+Calibration MakePrior(const Recording& recording, const StartResult& start);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_CALIBRATE_H_

@@ -1,0 +1,229 @@
+#include "estimator/start/find_start.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/time.h"
+#include "estimator/start/axis_permutation.h"
+#include "estimator/start/lag_search.h"
+#include "estimator/start/orientation.h"
+
+namespace camgyro {
+namespace {
+
+constexpr int kMaxTemplatePairs = 2000;  // of the search over all alignments: bounds its time
+constexpr double kNoRotationRadS = 0.003;
+constexpr double kWeakRotationRadS = 0.02;
+constexpr double kDegreesPerRadian = 57.29577951308232;
+constexpr double kUnitTolerance = 1.2;
+
+std::string Text(const char* format, double value) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof buffer, format, value);
+  return buffer;
+}
+std::string Seconds(double value) { return Text("%.3f s", value); }
+std::string Percent(double fraction) { return Text("%.0f %%", 100.0 * fraction); }
+std::string Rate(double value) { return Text("%.3g rad/s", value); }
+
+enum class Outcome { kTrusted, kNotFound, kDoesNotFollow, kRefused };
+
+struct Verdict {
+  Outcome outcome = Outcome::kTrusted;
+  std::string reason;
+};
+
+// White noise of the intervals' mean rates [rad/s], all axes together, from the gyro's second
+// differences: motion is smooth at the gyro's rate.
+double GyroNoise(const GyroRates& gyro, double interval_s) {
+  const auto n = static_cast<Eigen::Index>(gyro.times_s.size());
+  if (n < 3) return 0.0;
+  const Eigen::Matrix3Xd& w = gyro.omega_gyro_rad_s;
+  double power = 0.0;
+  for (Eigen::Index k = 2; k < n; ++k) {
+    power += (w.col(k) - 2.0 * w.col(k - 1) + w.col(k - 2)).squaredNorm() / 6.0;
+  }
+  const double span_s = gyro.times_s.back() - gyro.times_s.front();
+  const double samples = std::max(1.0, interval_s * static_cast<double>(n - 1) / span_s);
+  return std::sqrt(power / static_cast<double>(n - 2) / samples);
+}
+
+bool IsFactor(double ratio, double factor) {
+  return ratio > factor / kUnitTolerance && ratio < factor * kUnitTolerance;
+}
+
+// Is this search result a start to build on? `delay_offset_s` turns lags into delays.
+Verdict Judge(const LagSearch& search, double gyro_noise_rad_s, double delay_offset_s,
+              const StartOptions& options) {
+  if (!search.found) {
+    return {Outcome::kNotFound, "no overlap in time between camera and gyro"};
+  }
+  const RateAlignment::Fit& fit = search.best;
+  if (fit.gyro_rms_rad_s < kNoRotationRadS) {
+    return {Outcome::kRefused, "no rotation in the recording: the gyro's rate varies by " +
+                                   Rate(fit.gyro_rms_rad_s) + " rms only"};
+  }
+  const double explained = fit.explained, mirrored = search.mirrored.explained_mirrored;
+  if (mirrored >= options.min_explained &&
+      1.0 - mirrored + 0.02 < options.max_runner_up * (1.0 - explained + 0.02)) {
+    return {Outcome::kRefused,
+            "a gyro axis has the wrong sign, or two are swapped: a mirrored orientation explains " +
+                Percent(mirrored) + " of the gyro's motion, a rotation only " + Percent(explained) +
+                " (nearest: " +
+                DescribePermutation(FindNearestPermutation(search.mirrored.mirrored).P_gyro_cam) +
+                ", which is left-handed)"};
+  }
+  if (explained >= options.min_explained && IsFactor(fit.rate_ratio, kDegreesPerRadian)) {
+    return {Outcome::kRefused, "gyro in deg/s? Its rates are " + Text("%.1f", fit.rate_ratio) +
+                                   " times the camera's; rad/s are expected"};
+  }
+  if (explained < options.min_explained || search.on_edge) {
+    std::string reason;
+    if (fit.gyro_rms_rad_s < std::max(kWeakRotationRadS, 3.0 * gyro_noise_rad_s)) {
+      reason = "no rotation in the recording that stands out: the gyro's rate varies by " +
+               Rate(fit.gyro_rms_rad_s) + " rms, of which noise " + Rate(gyro_noise_rad_s) +
+               "; the camera's by " + Rate(fit.cam_rms_rad_s);
+    } else {
+      reason = "the picture does not follow the gyro (at the best delay the camera explains " +
+               Percent(explained) + " of the gyro's motion" +
+               (search.on_edge ? ", at the edge of the search" : "") + "; gyro rms " +
+               Rate(fit.gyro_rms_rad_s) + ", camera rms " + Rate(fit.cam_rms_rad_s) +
+               "): electronically stabilised, or clocks that do not "
+               "belong together, or camera rotations that are mostly wrong";
+    }
+    return {Outcome::kDoesNotFollow, reason};
+  }
+  if (fit.rate_ratio > options.max_rate_ratio || fit.rate_ratio < 1.0 / options.max_rate_ratio) {
+    return {Outcome::kRefused,
+            "the camera turns " + Text("%.2f", 1.0 / fit.rate_ratio) +
+                " times as fast as the gyro: wrong focal length, or electronically stabilised"};
+  }
+  if (search.runner_up_ratio > options.max_runner_up) {
+    return {Outcome::kRefused,
+            "ambiguous delay: " + Seconds(search.fit.lag_s + delay_offset_s) + " and " +
+                Seconds(search.runner_up_lag_s + delay_offset_s) +
+                " fit equally (periodic or too slow motion, unexplained fractions differ by a "
+                "factor of " +
+                Text("%.2f", search.runner_up_ratio) + " only)"};
+  }
+  if (!search.fit.converged) {
+    return {Outcome::kRefused,
+            "the delay has no distinct minimum near " + Seconds(search.fit.lag_s + delay_offset_s)};
+  }
+  return {};
+}
+
+StartResult MakeResult(const LagSearch& search, double delay_offset_s,
+                       const std::optional<Eigen::Quaterniond>& guess) {
+  StartResult result;
+  const StartFit& fit = search.fit;
+  result.delay_middle_row_s = fit.lag_s + delay_offset_s;
+  result.delay_sigma_s = std::sqrt(fit.covariance(0, 0));
+  for (const LagPoint& point : search.curve) {
+    result.curve.push_back({point.lag_s + delay_offset_s, 1.0 - point.explained});
+  }
+  result.runner_up_ratio = search.runner_up_ratio;
+  result.runner_up_delay_s = search.runner_up_lag_s + delay_offset_s;
+
+  const Orientation orientation =
+      CompleteOrientation(fit.q_gyro_cam, fit.covariance.block<3, 3>(1, 1), guess);
+  result.q_gyro_cam = orientation.q_gyro_cam;
+  result.rotation_sigma_rad = orientation.sigma_rad;
+  result.rotation_axes_determined = orientation.axes_determined;
+  result.notes = orientation.notes;
+  const NearestPermutation nearest = FindNearestPermutation(result.q_gyro_cam.toRotationMatrix());
+  result.nearest_permutation = nearest.P_gyro_cam;
+  result.permutation_angle_rad = nearest.angle_rad;
+
+  result.bias_gyro_rad_s = fit.bias_gyro_rad_s;
+  result.bias_sigma_rad_s = fit.covariance.diagonal().tail<3>().cwiseSqrt();
+  result.explained = search.best.explained;
+  result.rate_ratio = search.best.rate_ratio;
+  result.inliers = fit.inliers;
+  result.noise_rad_s = fit.noise_rad_s;
+  result.gyro_rms_rad_s = search.best.gyro_rms_rad_s;
+  result.pairs = search.best.pairs;
+  return result;
+}
+
+}  // namespace
+
+Result<StartResult> FindStart(const Recording& recording,
+                              const std::vector<CameraRotation>& rotations,
+                              const StartOptions& options) {
+  if (recording.gyro.size() < 3) return CannotEstimate("too short: fewer than 3 gyro samples");
+  GyroRates gyro(recording.gyro);
+  if (!gyro.omega_gyro_rad_s.allFinite()) return BadInput("a gyro rate is not finite");
+  auto made = MakeCameraRates(recording, rotations, gyro);
+  if (!made) return tl::unexpected<Error>(made.error());
+  CameraRates camera = *std::move(made);
+
+  const double first_s = camera.size() > 0 ? camera.frame_times_s[camera.frame_a.front()] : 0.0;
+  double last_s = first_s;
+  for (const int b : camera.frame_b) last_s = std::max(last_s, camera.frame_times_s[b]);
+  const double span_s = last_s - first_s;
+  if (camera.size() < options.min_pairs || span_s < options.min_span_s) {
+    return CannotEstimate("too short: " + std::to_string(camera.size()) + " camera rotations in " +
+                          Seconds(span_s) + ", expected at least " +
+                          std::to_string(options.min_pairs) + " in " + Seconds(options.min_span_s));
+  }
+  const double gyro_span_s = gyro.times_s.back();
+  const double noise = GyroNoise(gyro, span_s / camera.size());
+  const CameraRates liveliest = LiveliestStretch(camera, kMaxTemplatePairs);
+  const RateAlignment alignment(gyro, std::move(camera));
+
+  // delay = lag + offset; a difference of integers, so that large stamps lose nothing.
+  const double offset_s =
+      SecondsSince(recording.frames.front().stamp_ns, recording.gyro.front().stamp_ns);
+  const double guess_lag_s = recording.camera.delay_s.value_or(0.0) +
+                             0.5 * recording.camera.readout_s.value_or(0.0) - offset_s;
+
+  LagSearch search = SearchLag(alignment, guess_lag_s - options.search_s,
+                               guess_lag_s + options.search_s, options.min_pairs);
+  Verdict verdict = Judge(search, noise, offset_s, options);
+  std::string note;
+  if (verdict.outcome == Outcome::kNotFound || verdict.outcome == Outcome::kDoesNotFollow) {
+    // Clocks of different origin: every alignment with half of the shorter stream in the other.
+    const double overlap_s = 0.5 * std::min(span_s, gyro_span_s);
+    const RateAlignment reduced(gyro, liveliest);
+    const int min_pairs = std::max(options.min_pairs, liveliest.size() / 4);
+    const LagSearch all =
+        SearchLag(reduced, overlap_s - last_s, gyro_span_s - overlap_s - first_s, min_pairs);
+    Verdict all_verdict = Judge(all, noise, offset_s, options);
+    if (all.found) {
+      LagSearch near = SearchLag(alignment, all.fit.lag_s - options.search_s,
+                                 all.fit.lag_s + options.search_s, options.min_pairs);
+      if (all_verdict.outcome == Outcome::kTrusted) {
+        all_verdict = Judge(near, noise, offset_s, options);
+      }
+      if (near.runner_up_ratio < all.runner_up_ratio) {
+        near.runner_up_ratio = all.runner_up_ratio;
+        near.runner_up_lag_s = all.runner_up_lag_s;
+      }
+      // A refusal that names a cause, other than a bad fit, is better than none.
+      if (all_verdict.outcome == Outcome::kTrusted || verdict.outcome == Outcome::kNotFound) {
+        search = std::move(near);
+        note = (verdict.outcome == Outcome::kNotFound
+                    ? "camera and gyro stamps do not overlap in time"
+                    : "within " + Seconds(options.search_s) + " of the stamps nothing fits") +
+               std::string("; with clocks of different origin they fit at a delay of ") +
+               Seconds(search.fit.lag_s + offset_s);
+        if (verdict.outcome == Outcome::kNotFound && all_verdict.outcome != Outcome::kTrusted) {
+          all_verdict.reason = verdict.reason + " (camera starts " + Seconds(-offset_s) +
+                               " after the gyro, lasts " + Seconds(span_s) + ", the gyro " +
+                               Seconds(gyro_span_s) +
+                               "), nor with shifted clocks: " + all_verdict.reason;
+        }
+        verdict = all_verdict;
+      }
+    }
+  }
+  if (verdict.outcome != Outcome::kTrusted) return CannotEstimate(verdict.reason);
+
+  StartResult result = MakeResult(search, offset_s, recording.camera.q_gyro_cam);
+  if (!note.empty()) result.notes.insert(result.notes.begin(), note);
+  return result;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,210 @@
+#include "estimator/start/focal_scan.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "core/time.h"
+#include "estimator/start/lag_search.h"
+#include "estimator/start/rate_alignment.h"
+#include "estimator/start/start_fit.h"
+
+namespace camgyro {
+namespace {
+
+constexpr int kBlocks = 20;              // of time, for the honest sigma
+constexpr double kTruncateSigmas = 3.0;  // of the norm of three axes
+constexpr double kDeterminedLog = 0.1;   // sigma of log f
+constexpr double kDistinctLog = 0.22;    // 25 %
+constexpr double kMaxPull = 0.2;         // of log f, by noise
+constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
+
+struct ScanPoint {
+  double log_focal = 0.0;
+  std::vector<CameraRotation> rotations;
+  // Squared residual rates of each pair, and the pair's block; filled by Measure.
+  std::vector<double> squares;
+  std::vector<int> blocks;
+  double noise_rad_s = 0.0;
+  double gyro_power = 0.0;
+  // Truncated losses per block, and the total.
+  Eigen::VectorXd loss;
+};
+
+// Squared residuals at one focal length, lag, orientation and bias fitted to it.
+void Measure(const Recording& recording, const StartResult& near, double lag_s,
+             const StartOptions& options, ScanPoint* point) {
+  GyroRates gyro(recording.gyro);
+  auto camera = MakeCameraRates(recording, point->rotations, gyro);
+  if (!camera || camera->size() < options.min_pairs) return;
+  const RateAlignment alignment(std::move(gyro), *std::move(camera));
+  const StartFit fit = FitStart(alignment, lag_s, near.q_gyro_cam, near.bias_gyro_rad_s);
+  Eigen::Matrix3Xd rates;
+  std::vector<char> covered;
+  alignment.MeanGyroRates(fit.lag_s, &rates, &covered);
+  const CameraRates& cam = alignment.camera();
+  const int frames = static_cast<int>(recording.frames.size());
+  for (int i = 0; i < cam.size(); ++i) {
+    if (!covered[i]) continue;
+    const Eigen::Vector3d gyro_rate = rates.col(i) - fit.bias_gyro_rad_s;
+    const Eigen::Vector3d residual = gyro_rate - fit.q_gyro_cam * cam.omega_cam_rad_s.col(i);
+    point->squares.push_back(cam.weight[i] * residual.squaredNorm());
+    point->blocks.push_back(cam.frame_a[i] * kBlocks / frames);
+    point->gyro_power += cam.weight[i] * gyro_rate.squaredNorm();
+  }
+  point->noise_rad_s = fit.noise_rad_s;
+}
+
+// Parabola y = c0 + c1 x + c2 x^2 through points (least squares); rows of coefficients per column
+// of y.
+Eigen::MatrixXd FitParabola(const Eigen::VectorXd& x, const Eigen::MatrixXd& y) {
+  Eigen::MatrixXd powers(x.size(), 3);
+  powers << Eigen::VectorXd::Ones(x.size()), x, x.cwiseAbs2();
+  return powers.colPivHouseholderQr().solve(y);
+}
+
+}  // namespace
+
+Result<StartResult> FindStartAndFocal(const Recording& recording,
+                                      const CameraRotationsAtFocal& rotations_at,
+                                      const StartOptions& options,
+                                      const FocalScanOptions& scan_options) {
+  const double side_px = std::max(recording.camera.width_px, recording.camera.height_px);
+  if (!(side_px > 0.0)) return BadInput("focal scan: the size of the picture is not known");
+  if (recording.gyro.empty() || recording.frames.empty()) {
+    return CannotEstimate("focal scan: no gyro samples or no frames");
+  }
+  if (scan_options.points < 5 || !(scan_options.min_focal > 0.0) ||
+      !(scan_options.max_focal > scan_options.min_focal)) {
+    return BadUsage("focal scan: expected 5 points or more and 0 < min_focal < max_focal");
+  }
+  const double log_min = std::log(scan_options.min_focal * side_px);
+  const double spacing =
+      std::log(scan_options.max_focal / scan_options.min_focal) / (scan_options.points - 1);
+
+  // 1. Delay and orientation, to which a wrong focal length is mostly a scale: from the points
+  // nearest to the guess outwards, the first that works.
+  std::vector<ScanPoint> points(static_cast<size_t>(scan_options.points));
+  std::vector<size_t> order;
+  for (size_t k = 0; k < points.size(); ++k) {
+    points[k].log_focal = log_min + spacing * static_cast<double>(k);
+    points[k].rotations = rotations_at(std::exp(points[k].log_focal));
+    order.push_back(k);
+  }
+  const double log_guess = std::log(recording.camera.focal_px.value_or(0.85 * side_px));
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return std::abs(points[a].log_focal - log_guess) < std::abs(points[b].log_focal - log_guess);
+  });
+  StartOptions loose = options;
+  loose.max_rate_ratio = kLooseRateRatio;
+  Result<StartResult> near = CannotEstimate("");
+  tl::unexpected<Error> first_error = CannotEstimate("");
+  for (const size_t k : order) {
+    near = FindStart(recording, points[k].rotations, loose);
+    if (near) break;
+    if (k == order.front()) first_error = tl::unexpected<Error>(near.error());
+  }
+  if (!near) return first_error;
+  const double lag_s = near->delay_middle_row_s - SecondsSince(recording.frames.front().stamp_ns,
+                                                               recording.gyro.front().stamp_ns);
+
+  // 2. The scan, and two points more around its best.
+  for (ScanPoint& point : points) Measure(recording, *near, lag_s, options, &point);
+  double noise_rad_s = -1.0, gyro_power = 0.0;
+  size_t pairs = 1;
+  const auto truncate = [&] {
+    for (const ScanPoint& point : points) {
+      if (point.squares.empty()) continue;
+      if (noise_rad_s < 0.0 || point.noise_rad_s < noise_rad_s) noise_rad_s = point.noise_rad_s;
+      pairs = std::max(pairs, point.squares.size());
+      gyro_power = std::max(gyro_power, point.gyro_power);
+    }
+    const double cap = 3.0 * std::pow(kTruncateSigmas * noise_rad_s, 2);
+    for (ScanPoint& point : points) {
+      point.loss = Eigen::VectorXd::Zero(kBlocks);
+      for (size_t i = 0; i < point.squares.size(); ++i) {
+        point.loss[point.blocks[i]] += std::min(point.squares[i], cap);
+      }
+      // A pair that found no rotation at this focal length counts as an outlier.
+      point.loss.array() += cap * static_cast<double>(pairs - point.squares.size()) / kBlocks;
+    }
+  };
+  const auto best_point = [&points] {
+    return static_cast<size_t>(std::min_element(points.begin(), points.end(),
+                                                [](const ScanPoint& x, const ScanPoint& y) {
+                                                  return x.loss.sum() < y.loss.sum();
+                                                }) -
+                               points.begin());
+  };
+  truncate();
+  const double coarse = points[best_point()].log_focal;
+  for (const double offset : {-0.5 * spacing, 0.5 * spacing}) {
+    ScanPoint point;
+    point.log_focal = coarse + offset;
+    point.rotations = rotations_at(std::exp(point.log_focal));
+    Measure(recording, *near, lag_s, options, &point);
+    points.push_back(std::move(point));
+  }
+  truncate();
+  std::sort(points.begin(), points.end(),
+            [](const ScanPoint& x, const ScanPoint& y) { return x.log_focal < y.log_focal; });
+
+  // 3. The parabola.
+  StartFocal focal;
+  const size_t best = best_point();
+  const double best_log = points[best].log_focal, best_loss = points[best].loss.sum();
+  double second_loss = -1.0;
+  std::vector<size_t> close;
+  for (size_t k = 0; k < points.size(); ++k) {
+    const double loss = points[k].loss.sum(), distance = std::abs(points[k].log_focal - best_log);
+    focal.curve.push_back({std::exp(points[k].log_focal), loss / gyro_power});
+    if (distance < 1.1 * spacing) close.push_back(k);
+    if (distance > kDistinctLog && (second_loss < 0.0 || loss < second_loss)) second_loss = loss;
+  }
+  focal.runner_up_ratio = second_loss > 0.0 ? best_loss / second_loss : 1.0;
+  Eigen::VectorXd x(static_cast<Eigen::Index>(close.size()));
+  Eigen::MatrixXd y(static_cast<Eigen::Index>(close.size()), kBlocks);
+  for (size_t k = 0; k < close.size(); ++k) {
+    x[static_cast<Eigen::Index>(k)] = points[close[k]].log_focal - best_log;
+    y.row(static_cast<Eigen::Index>(k)) = points[close[k]].loss.transpose();
+  }
+  const Eigen::MatrixXd parabolas = FitParabola(x, y);
+  const Eigen::Vector3d sum = parabolas.rowwise().sum();
+  double log_focal = best_log, sigma_log = 1.0;
+  const bool inside = best > 0 && best + 1 < points.size();
+  if (inside && sum[2] > 0.0) {
+    const double shift = std::clamp(-0.5 * sum[1] / sum[2], -spacing, spacing);
+    log_focal += shift;
+    // The camera's rates are the regressor here, and their noise pulls the best scale down, f up,
+    // by (noise power of two axes) / (power of pan and tilt). The parabola's bend is the latter.
+    const double pull =
+        std::min(2.0 * noise_rad_s * noise_rad_s * static_cast<double>(pairs) / sum[2], kMaxPull);
+    log_focal -= pull;
+    const double classical = noise_rad_s * noise_rad_s / sum[2];
+    const double scores = (parabolas.row(1) + 2.0 * shift * parabolas.row(2)).squaredNorm() *
+                          kBlocks / (kBlocks - 1.0);
+    const double sandwich = scores / (4.0 * sum[2] * sum[2]);
+    const double of_pull = 0.25 * pull * pull;  // it is known to a half
+    sigma_log = std::min(1.0, std::sqrt(std::max(classical, sandwich) + of_pull));
+  }
+  focal.determined = sigma_log < kDeterminedLog;
+  focal.value_px = !focal.determined && recording.camera.focal_px ? *recording.camera.focal_px
+                                                                  : std::exp(log_focal);
+  focal.sigma_px = sigma_log * focal.value_px;
+
+  // 4. The start at that focal length.
+  auto start = FindStart(recording, rotations_at(focal.value_px), options);
+  if (!start) return start;
+  if (!focal.determined) {
+    start->notes.push_back(
+        "this motion does not determine the focal length (it needs pan or tilt); " +
+        std::string(recording.camera.focal_px ? "the recording's guess" : "the scan's best") +
+        " is used");
+  }
+  start->focal = std::move(focal);
+  return start;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,38 @@
+// A recording as the estimators see it: gyro rates and pairs of frames on one time axis.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_ESTIMATION_INPUT_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_ESTIMATION_INPUT_H_
+
+#include <cstdint>
+#include <vector>
+
+#include "core/recording.h"
+#include "estimator/window/pair_graph.h"
+
+namespace camgyro {
+
+// Two frames by their recorded stamps, seconds from EstimationInput::origin_ns.
+struct TimedPair {
+  int64_t id = 0;  // ascending with time_a_s
+  int frame_a = 0, frame_b = 0;
+  double time_a_s = 0.0, time_b_s = 0.0;
+  std::vector<Match> matches;  // empty for rotations
+  CameraRotation rotation;     // of recordings with attitudes
+};
+
+struct EstimationInput {
+  int64_t origin_ns = 0;  // the first gyro stamp; camera stamps are counted from it as they are
+  std::vector<TimedRate> rates;
+  std::vector<TimedPair> pairs;
+};
+
+// Pairs of neighbouring frames from matches or tracks; attitudes are paired `attitude_gap` frames
+// apart. What is absent gives no pairs.
+EstimationInput MakeEstimationInput(const Recording& recording, int attitude_gap = 1);
+
+// Standard deviation of the gyro's white noise per sample [rad/s]: as declared, else from the
+// differences between neighbouring samples (third differences; robust), within [5e-4, 2e-2].
+double GyroSigma(const Recording& recording);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_ESTIMATION_INPUT_H_

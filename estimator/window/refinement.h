@@ -1,0 +1,58 @@
+// All pairs of a recording in one problem: the best estimate that a recorded sequence allows.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/result.h"
+#include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_graph.h"
+
+namespace camgyro {
+
+struct RefinementOptions {
+  PairGraphOptions graph;
+  int max_rounds = 6;       // noise scale, directions and solve, until the estimate settles
+  double cluster_s = 2.0;   // stretches of the clustered covariance
+  double sigma_rad = 2e-3;  // first guess of the noise of camera rotations (attitudes)
+};
+
+struct FitQuality {
+  int pairs = 0;              // used
+  int matches = 0;            // in them
+  double inlier_ratio = 0.0;  // share of matches within the robust threshold
+  double noise_px = 0.0;      // robust standard deviation per axis (attitudes: rad)
+  double rms_px = 0.0;        // of residuals, each bounded by the loss
+};
+
+struct Refined {
+  Calibration calibration;
+  FitQuality quality;
+  int rounds = 0;
+  bool converged = false;
+  int skipped_pairs = 0;  // gyro gaps, too few matches, outside the gyro's time
+};
+
+// Fits all `pairs` of the input. start: values and prior_sigma; prior_mean: centre of the prior.
+// Errors: kCannotEstimate if fewer than 10 pairs can be used or no solve succeeds.
+Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+                       const Calibration& start, const Calibration& prior_mean,
+                       const RefinementOptions& options);
+
+// Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
+// direction of each pair from every other match, residuals from the rest.
+struct UnseenFit {
+  int pairs = 0;
+  int matches = 0;
+  double rms_px = 0.0;  // bounded by the loss, as FitQuality::rms_px
+};
+UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+                         const Calibration& calibration, double noise_px,
+                         const PairGraphOptions& options);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_

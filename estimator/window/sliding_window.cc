@@ -1,0 +1,112 @@
+#include "estimator/window/sliding_window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/robust_statistics.h"
+#include "core/time.h"
+
+namespace camgyro {
+
+SlidingWindow::SlidingWindow(const Calibration& start, const Calibration& prior_mean,
+                             int64_t origin_ns, const SlidingWindowOptions& options)
+    : options_(options),
+      origin_ns_(origin_ns),
+      graph_(start, prior_mean, options.graph),
+      noise_px_(options.graph.sigma_px) {
+  latest_.estimate = start;
+  latest_.noise_px = noise_px_;
+}
+
+AddResult SlidingWindow::AddGyroSample(const GyroSample& sample) {
+  if (!sample.omega_gyro_rad_s.allFinite()) return AddResult::kNotFinite;
+  const double time_s = SecondsSince(origin_ns_, sample.stamp_ns);
+  if (!(time_s > last_gyro_time_s_)) return AddResult::kNotIncreasing;
+  last_gyro_time_s_ = time_s;
+  graph_.AddRate({time_s, sample.omega_gyro_rad_s});
+  ProcessPending();
+  return AddResult::kAccepted;
+}
+
+AddResult SlidingWindow::AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns,
+                                 std::vector<Match> matches) {
+  for (const Match& match : matches) {
+    if (!match.px_a.allFinite() || !match.px_b.allFinite()) return AddResult::kNotFinite;
+  }
+  const double time_a_s = SecondsSince(origin_ns_, stamp_a_ns);
+  if (stamp_b_ns <= stamp_a_ns || time_a_s < last_pair_time_s_) return AddResult::kNotIncreasing;
+  last_pair_time_s_ = time_a_s;
+  pending_.push_back(
+      {stamp_b_ns, time_a_s, SecondsSince(origin_ns_, stamp_b_ns), std::move(matches)});
+  ProcessPending();
+  return AddResult::kAccepted;
+}
+
+void SlidingWindow::ProcessPending() {
+  while (!pending_.empty()) {
+    const Pending& next = pending_.front();
+    const AddPairResult added =
+        graph_.AddPair(next_pair_id_, next.time_a_s, next.time_b_s, next.matches);
+    if (added == AddPairResult::kGyroTooLate) return;
+    if (added == AddPairResult::kAdded) {
+      ++next_pair_id_;
+      ++num_used_;
+      Process(next);
+    } else {
+      ++num_skipped_;
+    }
+    pending_.pop_front();
+  }
+}
+
+void SlidingWindow::Process(const Pending& pair) {
+  const bool solve = settled_ || num_used_ % options_.unsettled_stride == 0 ||
+                     graph_.num_pairs() >= options_.unsettled_pairs;
+  if (!solve) return;
+  if (!settled_) {
+    // The estimate still moves: the directions with it.
+    for (const int64_t id : graph_.pair_ids()) graph_.Residuals(id, /*search=*/true);
+    UpdateNoise();
+  }
+  const SolveReport report = graph_.Solve({settled_ ? 4 : 10, 1e-4});
+  if (!report.usable) {
+    ++num_failed_solves_;  // the last good estimate stands
+    return;
+  }
+  UpdateNoise();
+  Calibration estimate = graph_.Estimate();
+  if (!graph_.EstimateCovariance(/*cluster_s=*/2.0, &estimate)) {
+    ++num_failed_solves_;
+    return;
+  }
+  settled_ = settled_ || Settled(estimate);
+  latest_ = {pair.stamp_b_ns, estimate, noise_px_, settled_};
+  if (listener_) listener_(latest_);
+
+  const int keep = settled_ ? options_.window_pairs : options_.unsettled_pairs - 1;
+  if (graph_.num_pairs() <= keep) return;
+  while (graph_.num_pairs() > keep) graph_.MarginalizeOldest();
+  graph_.ForgetOldRates();
+}
+
+void SlidingWindow::UpdateNoise() {
+  std::vector<std::vector<double>> residuals;
+  const std::vector<int64_t> ids = graph_.pair_ids();
+  for (const int64_t id : ids) residuals.push_back(graph_.Residuals(id, /*search=*/false));
+  const double relative = std::max(1e-3, RobustScale(residuals, /*lost_per_group=*/2));
+  // A settled window holds few pairs: its scale is averaged over time.
+  noise_px_ *= settled_ ? std::pow(relative, 0.1) : relative;
+  graph_.options()->sigma_px = noise_px_;
+  for (const int64_t id : ids) graph_.SetSigma(id, noise_px_);
+}
+
+bool SlidingWindow::Settled(const Calibration& estimate) const {
+  const StateVector sigma = estimate.sigma();
+  return sigma[kStateFocal] < options_.settled_focal * estimate.lens[kFocal] &&
+         sigma[kStateReadout] < options_.settled_readout_s &&
+         sigma[kStateDelay] < options_.settled_delay_s &&
+         sigma.segment<3>(kStateRotation).maxCoeff() < options_.settled_rotation_rad;
+}
+
+}  // namespace camgyro

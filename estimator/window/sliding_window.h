@@ -1,0 +1,99 @@
+// The online estimator: gyro samples and pairs of frames in real-time order, constant cost per
+// frame, bounded memory.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_SLIDING_WINDOW_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_SLIDING_WINDOW_H_
+
+#include <deque>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "core/calibration.h"
+#include "core/recording.h"
+#include "estimator/window/pair_graph.h"
+
+namespace camgyro {
+
+struct SlidingWindowOptions {
+  PairGraphOptions graph;
+  int window_pairs = 10;  // kept once the estimate has settled
+
+  // Until then nothing is marginalised, up to this many pairs: a prior that was linearised at a
+  // poor estimate stays wrong for ever (docs/window.md has the numbers). The window is then solved
+  // every `unsettled_stride` pairs.
+  int unsettled_pairs = 150;
+  int unsettled_stride = 10;
+  // Settled: the standard deviations are below these. Parameters that the motion never determines
+  // hold the window open until unsettled_pairs.
+  double settled_focal = 0.01;  // of the focal length
+  double settled_readout_s = 1e-3;
+  double settled_delay_s = 0.5e-3;
+  double settled_rotation_rad = 5e-3;
+};
+
+enum class AddResult {
+  kAccepted,
+  kNotFinite,
+  kNotIncreasing,  // stamp not after the one before
+};
+
+// What the window believes after one more pair of frames.
+struct WindowUpdate {
+  int64_t frame_stamp_ns = 0;  // second frame of the pair
+  Calibration estimate;        // with covariance
+  double noise_px = 0.0;
+  bool settled = false;
+};
+
+class SlidingWindow {
+ public:
+  // start: values, and prior_sigma around prior_mean. origin_ns: gyro clock; keep it near the data.
+  SlidingWindow(const Calibration& start, const Calibration& prior_mean, int64_t origin_ns,
+                const SlidingWindowOptions& options);
+
+  // Bad data are refused by the result and change nothing.
+  [[nodiscard]] AddResult AddGyroSample(const GyroSample& sample);
+  // A pair waits inside until the gyro has passed it. stamp_a may not go back.
+  [[nodiscard]] AddResult AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns,
+                                  std::vector<Match> matches);
+
+  // Called with every solved window, in order.
+  void SetListener(std::function<void(const WindowUpdate&)> listener) {
+    listener_ = std::move(listener);
+  }
+
+  const WindowUpdate& latest() const { return latest_; }
+  int num_used_pairs() const { return num_used_; }
+  int num_skipped_pairs() const { return num_skipped_; }
+  int num_failed_solves() const { return num_failed_solves_; }
+  const PairGraph& graph() const { return graph_; }
+
+ private:
+  struct Pending {
+    int64_t stamp_b_ns = 0;
+    double time_a_s = 0.0, time_b_s = 0.0;
+    std::vector<Match> matches;
+  };
+
+  void ProcessPending();
+  void Process(const Pending& pair);
+  void UpdateNoise();
+  bool Settled(const Calibration& estimate) const;
+
+  const SlidingWindowOptions options_;
+  const int64_t origin_ns_;
+  PairGraph graph_;
+  std::deque<Pending> pending_;
+  std::function<void(const WindowUpdate&)> listener_;
+  WindowUpdate latest_;
+  double last_gyro_time_s_ = -std::numeric_limits<double>::infinity();
+  double last_pair_time_s_ = -std::numeric_limits<double>::infinity();
+  int64_t next_pair_id_ = 0;
+  int num_used_ = 0, num_skipped_ = 0, num_failed_solves_ = 0;
+  double noise_px_ = 1.0;
+  bool settled_ = false;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_SLIDING_WINDOW_H_
