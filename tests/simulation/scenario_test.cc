@@ -2,6 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
+
+#include "tools/simulation/simulate.h"
+
 namespace camgyro::simulation {
 namespace {
 
@@ -80,6 +84,50 @@ TEST(Scenario, OverridesWinAndAreChecked) {
 
 TEST(Scenario, MissingFileIsNamed) {
   EXPECT_THAT(LoadScenario("/nowhere.yaml").error().message, HasSubstr("/nowhere.yaml"));
+}
+
+std::string ScenarioFolder() { return std::string(CAMGYRO_SOURCE_DIR) + "/tools/scenarios"; }
+
+TEST(ScenarioFiles, AllLoadAndEffectsAreTheOnesOfTheirName) {
+  int effects = 0, files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(ScenarioFolder())) {
+    SCOPED_TRACE(entry.path().string());
+    const auto scenario = LoadScenario(entry.path().string());
+    ASSERT_TRUE(scenario) << scenario.error().message;
+    ++files;
+    const std::string name = entry.path().stem().string();
+    if (name.rfind("effect_", 0) == 0) {
+      EXPECT_THAT(ActiveEffects(scenario->effects), ElementsAre(name.substr(7)));
+      ++effects;
+    }
+    const auto sensors = SimulateSensors(*scenario);  // the camera stays in its scene
+    EXPECT_TRUE(sensors) << sensors.error().message;
+  }
+  EXPECT_EQ(effects, 18);
+  EXPECT_GT(files, 30);
+}
+
+// default.yaml names every key with its default. That none is missing or stale shows in the
+// tracks: all options together give what no option gives.
+TEST(ScenarioFiles, DefaultIsTheDefault) {
+  const Scenario file = LoadScenario(ScenarioFolder() + "/default.yaml").value();
+  const Simulated a = SimulateTracks(file).value(), b = SimulateTracks(Scenario()).value();
+  ASSERT_EQ(a.recording.tracks.size(), b.recording.tracks.size());
+  for (size_t i = 0; i < a.recording.tracks.size(); ++i) {
+    ASSERT_EQ(a.recording.tracks[i].size(), b.recording.tracks[i].size());
+    for (size_t k = 0; k < a.recording.tracks[i].size(); ++k) {
+      EXPECT_LT((a.recording.tracks[i][k].px - b.recording.tracks[i][k].px).norm(), 1e-9);
+    }
+  }
+  ASSERT_EQ(a.recording.gyro.size(), b.recording.gyro.size());
+  for (size_t i = 0; i < a.recording.gyro.size(); ++i) {
+    const auto difference =
+        a.recording.gyro[i].omega_gyro_rad_s - b.recording.gyro[i].omega_gyro_rad_s;
+    EXPECT_LT(difference.norm(), 1e-7);  // the file rounds the mounting
+  }
+  EXPECT_EQ(file.video.crf, VideoOptions().crf);
+  EXPECT_EQ(file.video.full_well_electrons, VideoOptions().full_well_electrons);
+  EXPECT_EQ(file.scene.far_m, SceneOptions().far_m);
 }
 
 }  // namespace

@@ -103,7 +103,8 @@ TEST(Trajectory, CircleLooksAlongItsPath) {
 class TrajectoryFile : public testing::Test {
  protected:
   std::string Write(const std::string& text) {
-    const std::string path = testing::TempDir() + "/trajectory.txt";
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    const std::string path = testing::TempDir() + "/camgyro_trajectory_" + test->name();
     std::ofstream(path) << text;
     return path;
   }

@@ -78,10 +78,10 @@ Status WriteImu(const Recording& recording, const fs::path& imu) {
              accel ? ",a_x [m s^-2],a_y [m s^-2],a_z [m s^-2]" : "");
   for (size_t i = 0; i < recording.gyro.size(); ++i) {
     const Eigen::Vector3d& w = recording.gyro[i].omega_gyro_rad_s;
-    file.Print("%lld,%.12g,%.12g,%.12g", Stamp(recording.gyro[i].stamp_ns), w.x(), w.y(), w.z());
+    file.Print("%lld,%.9g,%.9g,%.9g", Stamp(recording.gyro[i].stamp_ns), w.x(), w.y(), w.z());
     if (accel) {
       const Eigen::Vector3d& a = recording.accel[i].accel_gyro_m_s2;
-      file.Print(",%.12g,%.12g,%.12g", a.x(), a.y(), a.z());
+      file.Print(",%.7g,%.7g,%.7g", a.x(), a.y(), a.z());
     }
     file.Print("\n");
   }
@@ -266,6 +266,21 @@ Status WritePictures(const Simulated& s, const Scenario& scenario, const fs::pat
   return encoder ? encoder->Close() : Status();
 }
 
+// Pictures or tracks of another recording in the folder would be taken for this one's.
+Status CheckFolder(const Scenario& scenario, const fs::path& cam) {
+  const VideoFormat format = scenario.video.format;
+  for (const auto& [name, ours] :
+       {std::pair("tracks.csv", format == VideoFormat::kNone),
+        std::pair("video.mp4", format == VideoFormat::kMp4),
+        std::pair("data", format == VideoFormat::kPng), std::pair("matches.csv", false),
+        std::pair("attitude.csv", false)}) {
+    if (ours || !fs::exists(cam / name)) continue;
+    return BadInput((cam / name).string() +
+                    ": belongs to another recording; expected a new or empty folder");
+  }
+  return {};
+}
+
 }  // namespace
 
 Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
@@ -273,6 +288,7 @@ Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
                       const std::function<void(size_t, size_t)>& progress) {
   const fs::path root(folder);
   try {
+    if (Status status = CheckFolder(scenario, root / "cam0"); !status) return status;
     fs::create_directories(root / "cam0");
     fs::create_directories(root / "imu0");
     Status status = WriteFrames(simulated, scenario, root / "cam0");

@@ -10,7 +10,8 @@
 
 namespace camgyro::simulation {
 
-// Writes into `folder` (made if absent; files of the same name are replaced)
+// Writes into `folder` (made if absent; an older recording of the same kind is replaced, one of
+// another kind is an error)
 //   cam0/data.csv, cam0/sensor.yaml, imu0/data.csv, imu0/sensor.yaml,
 //   cam0/tracks.csv            if there are tracks, or
 //   cam0/video.mp4, cam0/data/*.png   rendered, by scenario.video.format,
