@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <optional>
 
 namespace camgyro {
 namespace {
@@ -19,6 +20,37 @@ bool Inside(const cv::Point2f& point, const cv::Size& size, int border) {
   return point.x >= margin && point.y >= margin &&
          point.x <= static_cast<float>(size.width - 1) - margin &&
          point.y <= static_cast<float>(size.height - 1) - margin;
+}
+
+// The new frame with the brightness of the previous one, judged by the points found in both (the
+// mean and contrast of whole frames also change with what they show): a line through their grey
+// values, smoothed by the pyramid. Nothing if that changes less than noise would.
+std::optional<cv::Mat> LikePrevious(const cv::Mat& gray, const std::vector<cv::Mat>& previous,
+                                    const std::vector<cv::Mat>& current,
+                                    const std::vector<cv::Point2f>& from,
+                                    const std::vector<cv::Point2f>& to,
+                                    const std::vector<bool>& found) {
+  const int level = std::min(2, static_cast<int>(current.size()) / 2 - 1);
+  const auto at = [&](const std::vector<cv::Mat>& pyramid, const cv::Point2f& point) {
+    const cv::Mat& image = pyramid[static_cast<size_t>(2 * level)];
+    const cv::Point2f scaled = point * (1.0F / static_cast<float>(1 << level));
+    return static_cast<float>(image.at<uchar>(std::min(cvRound(scaled.y), image.rows - 1),
+                                              std::min(cvRound(scaled.x), image.cols - 1)));
+  };
+  std::vector<cv::Point2f> greys;
+  for (size_t i = 0; i < from.size(); ++i) {
+    if (found[i]) greys.emplace_back(at(current, to[i]), at(previous, from[i]));
+  }
+  if (greys.size() < 20) return std::nullopt;
+  cv::Vec4f line;  // direction, point
+  cv::fitLine(greys, line, cv::DIST_HUBER, 0, 0.01, 0.01);
+  const double gain = line[1] / line[0];
+  const double offset = line[3] - gain * line[2];
+  if (!(gain > 0.25 && gain < 4.0)) return std::nullopt;  // the greys are all the same, or wrong
+  if (std::abs(gain - 1.0) < 0.02 && std::abs(line[3] - line[2]) < 2.0) return std::nullopt;
+  cv::Mat alike;
+  gray.convertTo(alike, CV_8U, gain, offset);
+  return alike;
 }
 
 }  // namespace
@@ -40,11 +72,8 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
   }
   if (gray.empty() || gray.type() != CV_8UC1) return {};
 
-  const cv::Size window(options_.window_px, options_.window_px);
-  std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(gray, pyramid, window,
-                              PyramidLevels(options_.window_px, options_.max_motion * gray.cols));
-  if (!points_.empty()) FollowPoints(pyramid, predictor);
+  std::vector<cv::Mat> pyramid = Pyramid(gray);
+  if (!points_.empty()) FollowPoints(gray, pyramid, predictor);
   pyramid_ = std::move(pyramid);
   AddCorners(gray);
 
@@ -55,44 +84,64 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
   return tracked;
 }
 
-void KltTracker::FollowPoints(const std::vector<cv::Mat>& pyramid,
-                              const PointPredictor& predictor) {
-  // Both directions start from the same expected motion: the way back does not know where the
-  // way there began.
-  std::vector<cv::Point2f> found = points_;
-  if (predictor) {
-    for (cv::Point2f& point : found) {
-      const Eigen::Vector2d px = predictor(Eigen::Vector2d(point.x, point.y));
-      if (px.allFinite())
-        point = cv::Point2f(static_cast<float>(px.x()), static_cast<float>(px.y()));
-    }
-  }
-  std::vector<cv::Point2f> expected_motion(points_.size());
-  for (size_t i = 0; i < points_.size(); ++i) expected_motion[i] = found[i] - points_[i];
+std::vector<cv::Mat> KltTracker::Pyramid(const cv::Mat& gray) const {
+  std::vector<cv::Mat> pyramid;
+  cv::buildOpticalFlowPyramid(gray, pyramid, cv::Size(options_.window_px, options_.window_px),
+                              PyramidLevels(options_.window_px, options_.max_motion * gray.cols));
+  return pyramid;
+}
 
+KltTracker::Search KltTracker::SearchPoints(const std::vector<cv::Mat>& pyramid,
+                                            const std::vector<cv::Point2f>& start) const {
   const cv::Size window(options_.window_px, options_.window_px);
   const int levels = static_cast<int>(pyramid.size()) / 2 - 1;  // image and derivative each
   std::vector<uchar> found_ok, back_ok;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(pyramid_, pyramid, points_, found, found_ok, error, window, levels,
+  Search search{start, {}};
+  cv::calcOpticalFlowPyrLK(pyramid_, pyramid, points_, search.points, found_ok, error, window,
+                           levels, kStop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  // The way back starts from the same expected motion: it does not know where the way there began.
+  std::vector<cv::Point2f> back(start.size());
+  for (size_t i = 0; i < start.size(); ++i) back[i] = search.points[i] - (start[i] - points_[i]);
+  cv::calcOpticalFlowPyrLK(pyramid, pyramid_, search.points, back, back_ok, error, window, levels,
                            kStop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
-  std::vector<cv::Point2f> back(found.size());
-  for (size_t i = 0; i < found.size(); ++i) back[i] = found[i] - expected_motion[i];
-  cv::calcOpticalFlowPyrLK(pyramid, pyramid_, found, back, back_ok, error, window, levels, kStop,
-                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  search.found.resize(start.size());
+  for (size_t i = 0; i < start.size(); ++i) {
+    search.found[i] = found_ok[i] && back_ok[i] &&
+                      Inside(search.points[i], size_, Border(options_)) &&
+                      cv::norm(back[i] - points_[i]) <= options_.max_forward_backward_px;
+  }
+  return search;
+}
+
+void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& pyramid,
+                              const PointPredictor& predictor) {
+  std::vector<cv::Point2f> start = points_;
+  if (predictor) {
+    for (cv::Point2f& point : start) {
+      const Eigen::Vector2d px = predictor(Eigen::Vector2d(point.x, point.y));
+      if (px.allFinite()) {
+        point = cv::Point2f(static_cast<float>(px.x()), static_cast<float>(px.y()));
+      }
+    }
+  }
+  Search search = SearchPoints(pyramid, start);
+  if (const auto alike =
+          LikePrevious(gray, pyramid_, pyramid, points_, search.points, search.found)) {
+    search = SearchPoints(Pyramid(*alike), start);
+  }
 
   // Ids ascend, so of two points that have run into one the older stays.
   const double too_close_px = 0.5 * options_.min_distance_px;
   size_t kept = 0;
-  for (size_t i = 0; i < found.size(); ++i) {
-    bool good = found_ok[i] && back_ok[i] && Inside(found[i], size_, Border(options_)) &&
-                cv::norm(back[i] - points_[i]) <= options_.max_forward_backward_px;
+  for (size_t i = 0; i < points_.size(); ++i) {
+    bool good = search.found[i];
     for (size_t j = 0; j < kept && good; ++j) {
-      good = cv::norm(found[i] - points_[j]) >= too_close_px;
+      good = cv::norm(search.points[i] - points_[j]) >= too_close_px;
     }
     if (!good) continue;
     ids_[kept] = ids_[i];
-    points_[kept] = found[i];
+    points_[kept] = search.points[i];
     ++kept;
   }
   ids_.resize(kept);

@@ -28,7 +28,8 @@ struct TrackerOptions {
   int window_px = 21;
   // Motion without prediction that the pyramid must reach, as a fraction of the image width.
   double max_motion = 0.25;
-  // A point tracked there and back must return to within this distance.
+  // A point tracked there and back must return to within this distance. Distances seen (median,
+  // 90 %): 0.002, 0.012 px on euroc-v101-flight; 0.009, 0.26 px on phone-cc9-street.
   double max_forward_backward_px = 0.5;
 };
 
@@ -37,7 +38,16 @@ struct TrackerOptions {
 // Noise model: MatchNoise::kSecondImage. Every frame re-anchors the patch where the point was found
 // in the frame before, so the earlier position defines the point and the error of a consecutive
 // pair sits in its second image; over n frames the errors add up (a random walk). Matching against
-// the patch of birth would not drift, but its patch ages: see docs/tracker.md for the comparison.
+// the patch of birth would not drift, but its patch ages. Measured, a chain of frame-to-frame steps
+// against one direct step, per axis: 2 steps 0.004 px (median), 0.02 px (90 %) on
+// euroc-v101-flight, 0.009 and 0.16 px on phone-cc9-street; 4 steps 0.007, 0.03 and 0.02, 0.32 px.
+//
+// Exposure: where the points show that it changed, the frame is searched once more with the
+// brightness of the one before, if the first search finds 20. With every other frame 20 % darker,
+// 98.5 % of the points survive a frame on euroc-v101-flight (73 % without; 99 % unchanged) and 86.5
+// % on phone-cc9-street (64 %; 89 %). Mean and contrast of whole frames do not serve: they change
+// with large motion. CLAHE moves points by 0.025 px (median) where the exposure does not change at
+// all.
 //
 // The same frames give the same tracks, bit for bit.
 class KltTracker {
@@ -50,7 +60,15 @@ class KltTracker {
   std::vector<TrackedPoint> Add(const cv::Mat& gray, const PointPredictor& predictor = nullptr);
 
  private:
-  void FollowPoints(const std::vector<cv::Mat>& pyramid, const PointPredictor& predictor);
+  struct Search {
+    std::vector<cv::Point2f> points;  // where each of points_ is now
+    std::vector<bool> found;          // there and back, with the whole patch inside
+  };
+  std::vector<cv::Mat> Pyramid(const cv::Mat& gray) const;
+  Search SearchPoints(const std::vector<cv::Mat>& pyramid,
+                      const std::vector<cv::Point2f>& start) const;
+  void FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& pyramid,
+                    const PointPredictor& predictor);
   void AddCorners(const cv::Mat& gray);
 
   TrackerOptions options_;

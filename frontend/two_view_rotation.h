@@ -24,23 +24,24 @@ struct TwoViewOptions {
 // take it from the fundamental matrix). Minimises over rotation and translation direction together
 //   sum rho( r_i^2 + s_i^2 ),  r_i = tau . n_i / sigma(tau . n_i) [px],  n_i = a_i x R b_i,
 // r the distance from the epipolar line and s the distance from the epipole for matches on its
-// wrong side (points behind the camera): without s, rotation is mistaken for translation twice as
-// often. rho is Geman and McClure's, at the spread of the residuals. No translation is fine.
+// wrong side (points behind the camera), without which the rms error one frame apart is 1.5 mrad
+// instead of 0.9. rho is Geman and McClure's, at the spread of the residuals. No translation is
+// fine.
 //
 // On ov_handheld_gs (every third pair, 0.3 px noise per observation, lens known), median / rms
 // error per axis [mrad], against the 5-point algorithm of OpenCV and the rotation alone:
 //     frames apart   this          5-point       rotation alone   this, f 15 % too long
-//     1              0.64 / 0.91    3.0 / 740     2.6 / 2.6        1.1 / 1.6
-//     2              0.57 / 0.87    4.0 / 610     5.3 / 5.3        1.7 / 2.6
-//     4              0.57 / 1.0     3.0 / 339     10.6 / 10.7      2.9 / 5.3
-// (the 5-point algorithm's rms is that of solutions turned by half a turn).
-// With the lens's strong distortion unknown this is the worse choice (7.8 / 19 mrad against 5.5 /
-// 7.0 mrad of the rotation alone, two frames apart).
+//     1              0.64 / 0.93    3.0 / 740     2.6 / 2.6        1.1 / 1.6
+//     2              0.57 / 0.86    4.0 / 610     5.3 / 5.3        1.7 / 2.6
+//     4              0.57 / 0.80    3.0 / 339     10.6 / 10.7      2.9 / 5.2
+// (the 5-point algorithm's rms is that of solutions turned by half a turn). With the lens's strong
+// distortion unknown it is the worse choice: 7.7 / 19 against 5.5 / 6.9 of the rotation alone, two
+// frames apart.
 //
 // sigma_rad is the standard deviation of an axis (rms of the three) from the normal equations and
-// the residuals' spread. It knows neither errors of the lens nor the rolling shutter, and where
-// parallax is hardly larger than the noise it is too small (by NEESX in the median, one frame
-// apart, above).
+// the residuals' spread. Squared error over its expectation, above: median 1.5, 0.9, 0.8 (0.8 is
+// right), mean 5.9, 2.9, 1.8: where parallax hardly exceeds the noise it is too small now and then.
+// It knows neither errors of the lens nor the rolling shutter.
 //
 // Nothing if fewer than min_matches have a ray, or the matches do not determine the rotation.
 std::optional<CameraRotation> EstimateCameraRotation(const FramePair& pair, const Lens& lens_model,

@@ -14,10 +14,10 @@ namespace camgyro {
 namespace {
 
 // A scene without pixels, so that a moved picture of it is exact: a sum of plane waves, their
-// amplitude proportional to their length as in natural pictures (1/f).
+// amplitude proportional to a power of their length; 1 is that of natural pictures (1/f).
 class Waves {
  public:
-  explicit Waves(unsigned seed) {
+  explicit Waves(unsigned seed, double power = 1.0) {
     std::mt19937 generator(seed);
     std::uniform_real_distribution<double> angle(0.0, 2.0 * M_PI);
     std::uniform_real_distribution<double> log_length(std::log(8.0), std::log(400.0));
@@ -25,8 +25,9 @@ class Waves {
     for (Wave& wave : waves_) {
       const double direction = angle(generator), length_px = std::exp(log_length(generator));
       const double k = 2.0 * M_PI / length_px;
-      wave = {length_px, k * std::cos(direction), k * std::sin(direction), angle(generator)};
-      variance += 0.5 * length_px * length_px;
+      const double amplitude = std::pow(length_px, power);
+      wave = {amplitude, k * std::cos(direction), k * std::sin(direction), angle(generator)};
+      variance += 0.5 * amplitude * amplitude;
     }
     for (Wave& wave : waves_) wave.amplitude *= 50.0 / std::sqrt(variance);
   }
@@ -186,6 +187,18 @@ TEST(KltTracker, PredictionReplacesTheSearch) {
     return px + motion + Eigen::Vector2d(2, -1);
   });
   EXPECT_GT(FollowedFraction(before, after, motion), 0.6);  // a quarter leaves the picture
+}
+
+TEST(KltTracker, ExposureMayChange) {
+  const Waves scene(11, 0.0);  // fine texture
+  const Eigen::Vector2d motion(4.3, -2.2);
+  const cv::Mat first = scene.Render(kWidth, kHeight, {0, 0});
+  cv::Mat darker;
+  scene.Render(kWidth, kHeight, motion).convertTo(darker, CV_8U, 0.8, 5.0);
+  KltTracker tracker(SmallImageOptions());
+  const auto before = tracker.Add(first);
+  const auto after = tracker.Add(darker);
+  EXPECT_GT(FollowedFraction(before, after, motion), 0.85);
 }
 
 TEST(KltTracker, PredictionThatIsNotFiniteIsNoPrediction) {

@@ -80,8 +80,9 @@ TEST(EstimateCameraRotation, PureRotationWorks) {
   }
   EXPECT_GE(found, 36);
   std::nth_element(errors.begin(), errors.begin() + 18, errors.end());
-  // 0.42 px / 500 px / sqrt(100) = 0.085 mrad if the rotation were all there is to find.
-  EXPECT_LT(errors[18], 1e-3);
+  // 0.42 px / 500 px / sqrt(100) = 0.085 mrad if the rotation is all there is to find; a
+  // translation that is free to be found costs a factor of ten (1.1 mrad).
+  EXPECT_LT(errors[18], 0.3e-3);
 }
 
 TEST(EstimateCameraRotation, WrongMatchesDoLittleHarm) {
