@@ -2,20 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/lens.h"
 #include "frontend/two_view_rotation.h"
 
 namespace camgyro {
+namespace {
 
-std::vector<FramePair> PairsForRotations(const Recording& recording,
-                                         const RotationPairOptions& options) {
+constexpr double kPairS = 0.1;
+constexpr int kMinPairs = 30;  // the start asks for 20
+
+}  // namespace
+
+std::vector<FramePair> PairsForRotations(const Recording& recording) {
   if (!recording.matches.empty()) return recording.matches;
-  if (recording.tracks.empty()) return {};
   const double interval_s = MedianInterval(recording.frames);
-  const int gap = interval_s > 0.0
-                      ? std::max(1, static_cast<int>(std::lround(options.interval_s / interval_s)))
-                      : 1;
+  if (!(interval_s > 0.0)) return {};
+  const int longest = std::max(1, static_cast<int>(recording.tracks.size()) / kMinPairs);
+  const int gap = std::clamp(static_cast<int>(std::lround(kPairS / interval_s)), 1, longest);
   std::vector<FramePair> chain;
   for (FramePair& pair : PairsFromTracks(recording.tracks, gap)) {
     if (pair.frame_a % gap == 0) chain.push_back(std::move(pair));

@@ -22,7 +22,7 @@ DEFINE_double(delay_ms, 0.0,
 namespace camgyro {
 namespace {
 
-constexpr size_t kMaxScanPairs = 600;  // per trial focal length
+constexpr size_t kMaxScanPairs = 400;  // per trial focal length
 
 }  // namespace
 
