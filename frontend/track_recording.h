@@ -21,7 +21,7 @@ struct ImageMotion {
 };
 ImageMotion MeasureImageMotion(const Recording& recording);
 
-// kCannotEstimate if there are too few matches per pair for any estimate.
+// kCannotEstimate if there are too few matches per pair for any estimate, or nothing moves.
 Status CheckImageMotion(const Recording& recording);
 
 struct TrackingSummary {

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <system_error>
 
@@ -143,7 +144,14 @@ Status FileSet::Write() const {
 }
 
 std::string CalibrationYaml(const CalibrationReport& report, bool attitudes) {
-  const Calibration& c = report.calibration;
+  Calibration c = report.calibration;
+  if (attitudes) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    c.lens.setConstant(nan);
+    c.readout_s = nan;
+    c.covariance.topRows<kStateDelay>().setConstant(nan);
+    c.covariance.leftCols<kStateDelay>().setConstant(nan);
+  }
   const StateVector sigma = c.sigma();
   YAML::Emitter out;
   out.SetDoublePrecision(kDigits);

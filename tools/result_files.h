@@ -34,7 +34,7 @@ class FileSet {
 };
 
 // attitudes: no pixels were used; noise and residuals are then in rad, under the keys noise_rad and
-// rms_rad, and what needs pixels is among the unobservable.
+// rms_rad, and what needs pixels is .nan and among the unobservable.
 std::string CalibrationYaml(const CalibrationReport& report, bool attitudes);
 
 // One row per solved window, at the stamp of its last frame [camera clock]; only the header without
