@@ -139,6 +139,12 @@ Calibration MakePrior(const Recording& recording, const StartResult& start) {
   sigma[kStateFocal] = (guess.focal_px ? 0.15 : 0.30) * focal;
   sigma[kStateCx] = sigma[kStateCy] = 0.02 * std::hypot(guess.width_px, guess.height_px);
   sigma[kStateReadout] = guess.readout_s ? 5e-3 : 0.6 * interval;
+  if (recording.tracks.empty() && recording.matches.empty()) {
+    // An attitude has neither pixels nor rows: nothing depends on the lens, and the readout is 0.
+    prior.readout_s = 0.0;
+    prior.delay_s = start.delay_middle_row_s;
+    sigma.segment<4>(kStateFocal).setOnes();
+  }
   sigma[kStateDelay] = 0.05;
   sigma.segment<3>(kStateBias).setConstant(0.1);
   sigma.segment<3>(kStateRotation) = start.rotation_sigma_rad.cwiseMax(0.15);

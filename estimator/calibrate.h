@@ -68,7 +68,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
 //   f: 15 % around the declared one, 30 % around the scan's; c: 2 % of the diagonal around the
 //   centre; t_r: declared +- 5 ms, else half of the shorter of frame interval and 1/30 s, +- 60 %
 //   of that interval; t_d: +- 50 ms around the search's; b_g: 0 +- 0.1 rad/s; q_c: +- 0.15 rad
-//   around the search's.
+//   around the search's. Attitudes: t_r 0, and units for what needs pixels.
 Calibration MakePrior(const Recording& recording, const StartResult& start);
 
 }  // namespace camgyro

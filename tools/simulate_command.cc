@@ -1,9 +1,14 @@
 #include "tools/simulate_command.h"
 
+#include <gflags/gflags.h>
+
 #include <cstdio>
 
+#include "tools/commands.h"
 #include "tools/simulation/simulate.h"
 #include "tools/simulation/write_recording.h"
+
+DECLARE_string(out);
 
 namespace camgyro {
 
@@ -38,6 +43,22 @@ Status RunSimulate(const std::string& scenario_path, const std::string& out_dir,
               simulated->recording.frames.size(), video ? " rendered" : "",
               simulated->recording.gyro.size(), effects.empty() ? "none" : effects.c_str());
   return {};
+}
+
+Command SimulateCommand() {
+  Command command;
+  command.name = "simulate";
+  command.arguments = "SCENARIO.yaml [KEY=VALUE...]";
+  command.summary =
+      "makes a recording from a scenario file: tracks or a rendered video, with the truth beside "
+      "it "
+      "(KEY=VALUE: section.key of the scenario)";
+  command.flags = {"out"};
+  command.run = [](const std::vector<std::string>& arguments) -> Status {
+    if (FLAGS_out.empty()) return BadUsage("simulate: --out=DIR is needed");
+    return RunSimulate(arguments[0], FLAGS_out, {arguments.begin() + 1, arguments.end()});
+  };
+  return command;
 }
 
 }  // namespace camgyro

@@ -1,0 +1,34 @@
+// Camera rotations of a recording at a trial focal length: what the start asks for.
+#ifndef CAMGYRO_FRONTEND_CAMERA_ROTATIONS_H_
+#define CAMGYRO_FRONTEND_CAMERA_ROTATIONS_H_
+
+#include <vector>
+
+#include "core/recording.h"
+
+namespace camgyro {
+
+// Pairs of frames for rotations, each starting where the one before ends: from tracks, about 0.1 s
+// apart (less in recordings so short that few pairs would remain); from matches, as they are. Empty
+// without image motion.
+//
+// Rotation grows with the time between the frames, noise does not, but detail of the motion gets
+// lost. FindStart on ov_handheld_gs (lens known, truth 30 ms), and on gopro-hero5-karma (f 540 px):
+//   interval [s]                 0.033   0.066   0.1     0.133   0.2     0.3
+//   delay, error [ms]           -0.05   -0.06    0.03    0.01   -0.09   -0.12
+//   its sigma [ms]               0.22    0.12    0.09    0.09    0.09    0.10
+//   karma: explained [%]         67      75      89      61      88      -
+std::vector<FramePair> PairsForRotations(const Recording& recording);
+
+// At most `max_pairs` of them, evenly spread.
+std::vector<FramePair> SpreadPairs(const std::vector<FramePair>& pairs, size_t max_pairs);
+
+// EstimateCameraRotation (two_view_rotation.h) of each pair with the recording's declared lens (the
+// centre of the picture where it declares no principal point), and this focal length [px]. Pairs
+// whose rotation cannot be found are left out.
+std::vector<CameraRotation> CameraRotationsOf(const std::vector<FramePair>& pairs,
+                                              const CameraGuess& camera, double focal_px);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FRONTEND_CAMERA_ROTATIONS_H_

@@ -1,0 +1,91 @@
+#include "frontend/gyro_rotation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/lens.h"
+#include "core/pair_model.h"
+#include "core/time.h"
+
+namespace camgyro {
+namespace {
+
+constexpr double kMaxGyroGapS = 0.05;  // as in the estimators
+constexpr int kRowIterations = 3;      // the row of arrival decides over its own time
+
+ShutterParameters ShutterOf(const Calibration& calibration) {
+  return {calibration.delay_s, calibration.readout_s};
+}
+
+}  // namespace
+
+GyroRotation::GyroRotation(const Calibration& calibration, RotationChain chain, double interval_s)
+    : calibration_(calibration),
+      chain_(std::move(chain)),
+      R_gyro_cam_(calibration.q_gyro_cam.toRotationMatrix()),
+      interval_s_(interval_s) {}
+
+std::optional<GyroRotation> GyroRotation::Between(const std::vector<GyroSample>& gyro,
+                                                  const Calibration& calibration,
+                                                  int64_t stamp_a_ns, int64_t stamp_b_ns) {
+  const double first_s = calibration.delay_s + std::min(0.0, calibration.readout_s);
+  const double last_s = calibration.delay_s + std::max(0.0, calibration.readout_s);
+  const auto after = [](int64_t stamp_ns, const GyroSample& sample) {
+    return stamp_ns < sample.stamp_ns;
+  };
+  auto begin = std::upper_bound(gyro.begin(), gyro.end(), StampAt(stamp_a_ns, first_s), after);
+  const auto end = std::upper_bound(begin, gyro.end(), StampAt(stamp_b_ns, last_s), after);
+  if (begin == gyro.begin() || end == gyro.end()) return std::nullopt;
+  --begin;
+
+  std::vector<double> times_s;
+  Eigen::Matrix3Xd omega(3, end - begin + 1);
+  for (auto it = begin; it <= end; ++it) {
+    omega.col(it - begin) = it->omega_gyro_rad_s - calibration.bias_gyro_rad_s;
+    times_s.push_back(SecondsSince(stamp_a_ns, it->stamp_ns));
+    if (times_s.size() > 1 && times_s.back() - times_s[times_s.size() - 2] > kMaxGyroGapS) {
+      return std::nullopt;
+    }
+  }
+  return GyroRotation(calibration, RotationChain(times_s, omega),
+                      SecondsSince(stamp_a_ns, stamp_b_ns));
+}
+
+Eigen::Vector2d GyroRotation::Predict(const Eigen::Vector2d& px_a) const {
+  const Eigen::Vector2d no_idea =
+      Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  const Lens& lens = GetLens(calibration_.distortion_model);
+  const ShutterParameters shutter = ShutterOf(calibration_);
+  Bearing bearing;
+  if (!EvaluateBearing(lens, calibration_.lens, shutter, R_gyro_cam_, chain_, 0.0,
+                       calibration_.height_px, px_a, &bearing, false)) {
+    return no_idea;
+  }
+  Eigen::Vector2d px_b = px_a;
+  for (int i = 0; i < kRowIterations; ++i) {
+    const double row = std::clamp(px_b.y(), 0.0, static_cast<double>(calibration_.height_px));
+    const RotationChain::State state =
+        chain_.At(RowTimeGyroS(interval_s_, shutter, row, calibration_.height_px));
+    const std::optional<Eigen::Vector2d> projected = lens.Project(
+        (state.R_ref_gyro * R_gyro_cam_).transpose() * bearing.ray_ref, calibration_.lens);
+    if (!projected) return no_idea;
+    px_b = *projected;
+  }
+  return px_b;
+}
+
+std::optional<RotatedMatch> GyroRotation::Rotate(const Match& match) const {
+  const Lens& lens = GetLens(calibration_.distortion_model);
+  const ShutterParameters shutter = ShutterOf(calibration_);
+  Bearing a, b;
+  const auto evaluate = [&](double frame_time_s, const Eigen::Vector2d& px, Bearing* bearing) {
+    return EvaluateBearing(lens, calibration_.lens, shutter, R_gyro_cam_, chain_, frame_time_s,
+                           calibration_.height_px, px, bearing, false);
+  };
+  if (!evaluate(0.0, match.px_a, &a) || !evaluate(interval_s_, match.px_b, &b)) return std::nullopt;
+  return RotatedMatch{a.ray_ref, b.ray_ref, a.J_ray_px, b.J_ray_px};
+}
+
+}  // namespace camgyro

@@ -1,0 +1,49 @@
+// From pictures to tracks: the whole frontend in one call.
+#ifndef CAMGYRO_FRONTEND_TRACK_RECORDING_H_
+#define CAMGYRO_FRONTEND_TRACK_RECORDING_H_
+
+#include <functional>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/recording.h"
+#include "core/result.h"
+#include "frontend/tracker.h"
+
+namespace camgyro {
+
+// The image motion that a recording has, whoever found it.
+struct ImageMotion {
+  size_t pairs = 0;          // of frames
+  size_t total_matches = 0;  // in them
+  double matches = 0.0;      // per pair, median
+  double motion_px = 0.0;    // of a match, median
+};
+ImageMotion MeasureImageMotion(const Recording& recording);
+
+// kCannotEstimate if there are too few matches per pair for any estimate, or nothing moves.
+Status CheckImageMotion(const Recording& recording);
+
+struct TrackingSummary {
+  double outlier_ratio = 0.0;  // share of matches taken for wrong
+  double seconds = 0.0;
+};
+
+// Called with the done share 0..1.
+using TrackingProgress = std::function<void(double done)>;
+
+// Decodes all frames, follows corners, and cuts tracks where a match is wrong: the track goes on
+// under a new id. Sets `tracks` (one entry per frame), `match_noise`, removes
+// `matches`.
+//
+// Without a calibration, wrong is what RejectByBinHomography rejects; with one, the gyro predicts
+// where points go, and wrong is what is off its epipolar line (outliers.h).
+//
+// Errors of the files; kCannotEstimate as CheckImageMotion.
+Result<TrackingSummary> TrackRecording(const TrackerOptions& options,
+                                       const Calibration* calibration,
+                                       const TrackingProgress& progress, Recording* recording);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_FRONTEND_TRACK_RECORDING_H_

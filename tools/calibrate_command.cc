@@ -1,0 +1,101 @@
+// `camgyro calibrate RECORDING --out DIR`: the main job.
+#include <gflags/gflags.h>
+
+#include <cstdio>
+#include <utility>
+
+#include "estimator/calibrate.h"
+#include "tools/commands.h"
+#include "tools/recording_input.h"
+#include "tools/result_files.h"
+#include "tools/summary.h"
+
+DEFINE_string(out, "",
+              "folder of the result, made if absent (calibrate: ./calibration; track: the "
+              "recording; delay: no files)");
+DEFINE_string(estimator, "window", "online estimator: window");
+DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");
+DEFINE_bool(refine, true,
+            "end with all frames in one problem; without, the online estimate is the result");
+DEFINE_double(search_s, 2.0, "half range of the delay search");
+DECLARE_bool(quiet);
+
+namespace camgyro {
+namespace {
+
+Result<CalibrateOptions> OptionsFromFlags() {
+  CalibrateOptions options;
+  if (FLAGS_estimator != "window") {
+    return BadUsage("--estimator=" + FLAGS_estimator + ": expected window");
+  }
+  if (FLAGS_residual == "determinant") {
+    options.residual = ResidualKind::kDeterminant;
+  } else if (FLAGS_residual != "plane") {
+    return BadUsage("--residual=" + FLAGS_residual + ": expected plane or determinant");
+  }
+  if (!(FLAGS_search_s > 0.0)) return BadUsage("--search_s: expected a positive number");
+  options.start.search_s = FLAGS_search_s;
+  options.refine = FLAGS_refine;
+  return options;
+}
+
+Status RunCalibrate(const std::vector<std::string>& arguments) {
+  const Result<CalibrateOptions> options = OptionsFromFlags();
+  if (!options) return tl::unexpected(options.error());
+  FileSet files(FLAGS_out.empty() ? "calibration" : FLAGS_out);
+  if (Status writable = files.CheckWritable(); !writable) return writable;
+  Result<Recording> recording = OpenRecording(arguments[0]);
+  if (!recording) return tl::unexpected(recording.error());
+  if (!FLAGS_quiet) {
+    std::printf("%s: %s\n%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),
+                Notes("input", recording->notes).c_str());
+    std::fflush(stdout);
+  }
+
+  Result<CalibrationReport> report = CannotEstimate("");
+  Result<TrackingSummary> tracking;
+  {
+    ProgressBar bar;
+    tracking = EnsureImageMotion(&bar, &*recording);
+    if (!tracking) return tl::unexpected(tracking.error());
+    report =
+        CalibrateRecording(*recording, RotationsFrom(*recording), *options,
+                           [&](const std::string& stage, double done) { bar.Show(stage, done); });
+  }
+  if (!report) return tl::unexpected(report.error());
+
+  const bool attitudes = HasOnlyAttitudes(*recording);
+  files.Add("trace.csv", TraceCsv(report->trace));
+  files.Add("delay.csv", DelayCsv(report->start.curve));
+  files.Add("calibration.yaml", CalibrationYaml(*report, attitudes));
+  if (Status written = files.Write(); !written) return written;
+
+  std::printf("%s", ParameterTable(report->calibration, attitudes).c_str());
+  if (!FLAGS_quiet) {
+    std::printf("\n%s%s%s%s%s%s", MotionLine(*recording, *tracking).c_str(),
+                StartLine(report->start).c_str(), QualityLine(*report, attitudes).c_str(),
+                TimeLine(*report, tracking->seconds, recording->frames.size()).c_str(),
+                Notes("note", report->notes).c_str(), Notes("doubt", report->doubts).c_str());
+    std::printf("written    %s/calibration.yaml, trace.csv, delay.csv\n", files.folder().c_str());
+  }
+  return {};
+}
+
+}  // namespace
+
+Command CalibrateCommand() {
+  Command command;
+  command.name = "calibrate";
+  command.arguments = "RECORDING";
+  command.summary =
+      "focal length, readout time, delay, mounting and gyro bias of a recording: with their "
+      "uncertainty, into calibration.yaml (trace.csv: the online estimate over time; delay.csv: "
+      "the delay search)";
+  command.flags = {"out", "residual", "estimator", "refine"};
+  for (const std::string& name : GuessFlags()) command.flags.push_back(name);
+  command.flags.insert(command.flags.end(), {"search_s", "quiet"});
+  command.run = RunCalibrate;
+  return command;
+}
+
+}  // namespace camgyro

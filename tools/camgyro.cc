@@ -1,0 +1,43 @@
+// camgyro COMMAND: finds the command, and turns its result into a message and an exit code.
+#include <glog/logging.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "tools/commands.h"
+
+namespace camgyro {
+namespace {
+
+Status Run(const std::vector<std::string>& words) {
+  if (words.empty()) {
+    std::fputs(ProgramHelp().c_str(), stderr);
+    return BadUsage("no command given");
+  }
+  if (words[0] == "--help" || words[0] == "-h") return HelpCommand().run({});
+  const Result<Command> command = FindCommand(words[0]);
+  if (!command) return tl::unexpected(command.error());
+  const Result<ParsedCommandLine> parsed =
+      ParseCommandLine(*command, {words.begin() + 1, words.end()});
+  if (!parsed) return tl::unexpected(parsed.error());
+  if (parsed->wants_help) return HelpCommand().run({command->name});
+  return command->run(parsed->arguments);
+}
+
+}  // namespace
+}  // namespace camgyro
+
+int main(int argc, char** argv) {
+  google::InitGoogleLogging(argv[0]);
+  FLAGS_logtostderr = true;
+  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres warns about ends up in the results
+  const camgyro::Status status = camgyro::Run({argv + 1, argv + argc});
+  if (status) return EXIT_SUCCESS;
+  std::fprintf(
+      stderr, "camgyro: %s%s\n",
+      status.error().kind == camgyro::ErrorKind::kCannotEstimate ? "cannot estimate: " : "",
+      status.error().message.c_str());
+  return static_cast<int>(status.error().kind);
+}

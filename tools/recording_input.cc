@@ -1,0 +1,82 @@
+#include "tools/recording_input.h"
+
+#include <gflags/gflags.h>
+
+#include <cstdio>
+#include <utility>
+
+#include "core/time.h"
+#include "frontend/camera_rotations.h"
+#include "frontend/readers/read_recording.h"
+#include "tools/command_line.h"
+
+DEFINE_double(focal_px, 0.0, "first guess of the focal length; default: sensor.yaml's, else found");
+DEFINE_double(
+    readout_ms, 0.0,
+    "first guess of the readout time, first to last row; default: sensor.yaml's, else half "
+    "a frame interval");
+DEFINE_double(delay_ms, 0.0,
+              "centre of the delay search, gyro clock minus camera stamp; default: sensor.yaml's, "
+              "else 0");
+
+namespace camgyro {
+namespace {
+
+constexpr size_t kMaxScanPairs = 400;  // per trial focal length
+
+}  // namespace
+
+std::vector<std::string> GuessFlags() { return {"focal_px", "readout_ms", "delay_ms"}; }
+
+Result<Recording> OpenRecording(const std::string& path) {
+  if (FlagGiven("focal_px") && !(FLAGS_focal_px > 0.0)) {
+    return BadUsage("--focal_px: expected a positive number");
+  }
+  Result<Recording> recording = ReadRecording(path);
+  if (!recording) return recording;
+  CameraGuess& guess = recording->camera;
+  if (FlagGiven("focal_px")) guess.focal_px = FLAGS_focal_px;
+  if (FlagGiven("readout_ms")) guess.readout_s = 1e-3 * FLAGS_readout_ms;
+  if (FlagGiven("delay_ms")) guess.delay_s = 1e-3 * FLAGS_delay_ms;
+  return recording;
+}
+
+bool HasOnlyAttitudes(const Recording& recording) {
+  return recording.tracks.empty() && recording.matches.empty() && !recording.HasImages() &&
+         !recording.q_cam_world.empty();
+}
+
+Result<TrackingSummary> EnsureImageMotion(ProgressBar* progress, Recording* recording) {
+  if (HasOnlyAttitudes(*recording)) return TrackingSummary{};
+  if (recording->tracks.empty() && recording->matches.empty()) {
+    return TrackRecording(
+        {}, nullptr, [&](double done) { progress->Show("tracking", done); }, recording);
+  }
+  if (Status enough = CheckImageMotion(*recording); !enough) return tl::unexpected(enough.error());
+  return TrackingSummary{};
+}
+
+CameraRotationsAtFocal RotationsFrom(const Recording& recording) {
+  return [pairs = SpreadPairs(PairsForRotations(recording), kMaxScanPairs),
+          camera = recording.camera](double focal_px) {
+    return CameraRotationsOf(pairs, camera, focal_px);
+  };
+}
+
+std::string DescribeRecording(const Recording& recording) {
+  char text[300];
+  const double frame_s = MedianInterval(recording.frames), gyro_s = MedianInterval(recording.gyro);
+  const double span_s =
+      SecondsSince(recording.frames.front().stamp_ns, recording.frames.back().stamp_ns);
+  std::string size;
+  if (recording.camera.width_px > 0) {
+    size = std::to_string(recording.camera.width_px) + " x " +
+           std::to_string(recording.camera.height_px) + ", ";
+  }
+  std::snprintf(text, sizeof text, "%s%zu frames in %.1f s (%.1f Hz), gyro %.0f Hz", size.c_str(),
+                recording.frames.size(), span_s, frame_s > 0.0 ? 1.0 / frame_s : 0.0,
+                gyro_s > 0.0 ? 1.0 / gyro_s : 0.0);
+  return text;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,207 @@
+#include "tools/result_files.h"
+
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <system_error>
+
+namespace camgyro {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDigits = 10;
+
+using Values = std::vector<double>;
+
+Values Segment(const StateVector& state, int first, int size) {
+  return {state.data() + first, state.data() + first + size};
+}
+
+void EmitScalar(YAML::Emitter& out, const char* key, double value, double sigma) {
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
+      << YAML::Value << value << YAML::Key << "sigma" << YAML::Value << sigma << YAML::EndMap;
+}
+
+void EmitVector(YAML::Emitter& out, const char* key, const Values& value, const char* sigma_key,
+                const Values& sigma) {
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
+      << YAML::Value << value << YAML::Key << sigma_key << YAML::Value << sigma << YAML::EndMap;
+}
+
+void BeginSection(YAML::Emitter& out, const char* key) {
+  out << YAML::Key << key << YAML::Value << YAML::BeginMap;
+}
+
+void EmitCamera(YAML::Emitter& out, const Calibration& c) {
+  const StateVector sigma = c.sigma();
+  BeginSection(out, "camera");
+  out << YAML::Key << "resolution" << YAML::Value << YAML::Flow
+      << std::vector<int>{c.width_px, c.height_px};
+  EmitScalar(out, "focal_px", c.lens[kFocal], sigma[kStateFocal]);
+  EmitVector(out, "principal_px", {c.lens[kCx], c.lens[kCy]}, "sigma", Segment(sigma, kStateCx, 2));
+  EmitScalar(out, "aspect_ratio", c.lens[kAspect], 0.0);
+  Values coefficients;
+  if (c.distortion_model != DistortionModel::kNone) {
+    coefficients.assign(c.lens.data() + kK1, c.lens.data() + kLensSize);
+  }
+  out << YAML::Key << "distortion" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
+      << "model" << YAML::Value << DistortionModelName(c.distortion_model) << YAML::Key << "value"
+      << YAML::Value << coefficients << YAML::Key << "sigma" << YAML::Value
+      << Values(coefficients.size(), 0.0) << YAML::EndMap << YAML::EndMap;
+}
+
+void EmitCovariance(YAML::Emitter& out, const Calibration& c) {
+  BeginSection(out, "covariance");
+  out << YAML::Key << "order" << YAML::Value << YAML::Flow
+      << std::vector<std::string>(StateNames().begin(), StateNames().end());
+  out << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
+  for (int i = 0; i < kStateSize; ++i) {
+    out << YAML::Flow << Segment(c.covariance.col(i), 0, kStateSize);
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+}
+
+void EmitQuality(YAML::Emitter& out, const CalibrationReport& report, bool attitudes) {
+  const FitQuality& quality = report.quality;
+  BeginSection(out, "quality");
+  out << YAML::Key << "pairs" << YAML::Value << quality.pairs;
+  out << YAML::Key << "matches" << YAML::Value << quality.matches;
+  out << YAML::Key << "inlier_ratio" << YAML::Value << quality.inlier_ratio;
+  out << YAML::Key << (attitudes ? "noise_rad" : "noise_px") << YAML::Value << quality.noise_px;
+  out << YAML::Key << (attitudes ? "rms_rad" : "rms_px") << YAML::Value << quality.rms_px;
+  if (report.unseen) {
+    out << YAML::Key << "unseen_rms_px" << YAML::Value << report.unseen->rms_px;
+  }
+  std::vector<std::string> unobservable;
+  for (size_t i = 0; i < kStateSize; ++i) {
+    if (!report.calibration.determined[i]) unobservable.push_back(StateNames()[i]);
+  }
+  out << YAML::Key << "unobservable" << YAML::Value << YAML::Flow << unobservable << YAML::EndMap;
+}
+
+std::string TemporaryName(const fs::path& file) {
+  return (file.parent_path() / ("." + file.filename().string() + ".tmp" + std::to_string(getpid())))
+      .string();
+}
+
+// Columns of a trace row: values in the trace's order, from the state's.
+Values TraceValues(const Calibration& c) {
+  const Eigen::Quaterniond& q = c.q_gyro_cam;
+  return {c.lens[kFocal],
+          c.lens[kCx],
+          c.lens[kCy],
+          c.readout_s,
+          c.delay_s,
+          c.bias_gyro_rad_s.x(),
+          c.bias_gyro_rad_s.y(),
+          c.bias_gyro_rad_s.z(),
+          q.w(),
+          q.x(),
+          q.y(),
+          q.z()};
+}
+
+}  // namespace
+
+Status FileSet::CheckWritable() const {
+  std::error_code error;
+  fs::path there = fs::absolute(folder_, error);
+  while (!fs::exists(there, error) && there.has_relative_path()) there = there.parent_path();
+  if (!fs::is_directory(there, error) || access(there.c_str(), W_OK | X_OK) != 0) {
+    return BadUsage("--out=" + folder_ + ": cannot write into " + there.string());
+  }
+  return {};
+}
+
+Status FileSet::Write() const {
+  std::error_code error;
+  std::vector<std::pair<std::string, fs::path>> written;
+  const auto give_up = [&](const std::string& file, const std::string& why) -> Status {
+    for (const auto& [temporary, name] : written) fs::remove(temporary, error);
+    return BadUsage("--out: cannot write " + file + ": " + why);
+  };
+  for (const auto& [name, text] : files_) {
+    const fs::path file = fs::path(folder_) / name;
+    fs::create_directories(file.parent_path(), error);
+    if (error) return give_up(file.string(), error.message());
+    written.emplace_back(TemporaryName(file), file);
+    std::ofstream stream(written.back().first, std::ios::binary);
+    stream << text;
+    stream.close();
+    if (!stream) return give_up(file.string(), "the disk is full, or not writable");
+  }
+  for (const auto& [temporary, file] : written) {
+    fs::rename(temporary, file, error);
+    if (error) return give_up(file.string(), error.message());
+  }
+  return {};
+}
+
+std::string CalibrationYaml(const CalibrationReport& report, bool attitudes) {
+  Calibration c = report.calibration;
+  if (attitudes) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    c.lens.setConstant(nan);
+    c.readout_s = nan;
+    c.covariance.topRows<kStateDelay>().setConstant(nan);
+    c.covariance.leftCols<kStateDelay>().setConstant(nan);
+  }
+  const StateVector sigma = c.sigma();
+  YAML::Emitter out;
+  out.SetDoublePrecision(kDigits);
+  out << YAML::BeginMap;
+  EmitCamera(out, c);
+  BeginSection(out, "shutter");
+  EmitScalar(out, "readout_s", c.readout_s, sigma[kStateReadout]);
+  out << YAML::EndMap;
+  BeginSection(out, "clock");
+  EmitScalar(out, "delay_s", c.delay_s, sigma[kStateDelay]);
+  out << YAML::EndMap;
+  BeginSection(out, "gyro");
+  EmitVector(out, "bias_rad_s",
+             {c.bias_gyro_rad_s.x(), c.bias_gyro_rad_s.y(), c.bias_gyro_rad_s.z()}, "sigma",
+             Segment(sigma, kStateBias, 3));
+  out << YAML::EndMap;
+  BeginSection(out, "extrinsics");
+  EmitVector(out, "q_gyro_cam_wxyz",
+             {c.q_gyro_cam.w(), c.q_gyro_cam.x(), c.q_gyro_cam.y(), c.q_gyro_cam.z()}, "sigma_rad",
+             Segment(sigma, kStateRotation, 3));
+  out << YAML::EndMap;
+  out << YAML::Key << "effects" << YAML::Value << YAML::Flow << YAML::BeginSeq << YAML::EndSeq;
+  EmitCovariance(out, c);
+  EmitQuality(out, report, attitudes);
+  out << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+std::string TraceCsv(const std::vector<WindowUpdate>& trace) {
+  std::ostringstream out;
+  out.precision(kDigits);
+  out << "#timestamp_ns,focal_px,cx_px,cy_px,readout_s,delay_s,bias_x,bias_y,bias_z,q_w,q_x,q_y,q_"
+         "z";
+  for (const std::string& name : StateNames()) out << ",sigma_" << name;
+  out << "\n";
+  for (const WindowUpdate& update : trace) {
+    out << update.frame_stamp_ns;
+    for (const double value : TraceValues(update.estimate)) out << "," << value;
+    for (const double value : Segment(update.estimate.sigma(), 0, kStateSize)) out << "," << value;
+    out << "\n";
+  }
+  return out.str();
+}
+
+std::string DelayCsv(const std::vector<DelayResidual>& curve) {
+  std::ostringstream out;
+  out.precision(kDigits);
+  out << "#delay_s,unexplained\n";
+  for (const DelayResidual& point : curve) out << point.delay_s << "," << point.residual << "\n";
+  return out.str();
+}
+
+}  // namespace camgyro

@@ -1,0 +1,49 @@
+// The files of a result: calibration.yaml, trace.csv, delay.csv (design.md section 7).
+#ifndef CAMGYRO_TOOLS_RESULT_FILES_H_
+#define CAMGYRO_TOOLS_RESULT_FILES_H_
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/result.h"
+#include "estimator/calibrate.h"
+
+namespace camgyro {
+
+// Text files that appear together or not at all: all are written under temporary names in their
+// folder first, then renamed.
+class FileSet {
+ public:
+  explicit FileSet(std::string folder) : folder_(std::move(folder)) {}
+
+  // Is the folder there, or can it be made? Asked before hours of work, not after them.
+  Status CheckWritable() const;
+  void Add(const std::string& name, std::string text) {
+    files_.emplace_back(name, std::move(text));
+  }
+  // Makes the folder (names may hold folders too). On failure nothing new is left behind.
+  Status Write() const;
+
+  const std::string& folder() const { return folder_; }
+
+ private:
+  std::string folder_;
+  std::vector<std::pair<std::string, std::string>> files_;
+};
+
+// attitudes: no pixels were used; noise and residuals are then in rad, under the keys noise_rad and
+// rms_rad, and what needs pixels is .nan and among the unobservable.
+std::string CalibrationYaml(const CalibrationReport& report, bool attitudes);
+
+// One row per solved window, at the stamp of its last frame [camera clock]; only the header without
+// an online pass. The sigmas of the rotation are three angles about the camera's axes [rad].
+std::string TraceCsv(const std::vector<WindowUpdate>& trace);
+
+// The delay search's curve: fraction of the gyro's power that is not explained at each delay.
+std::string DelayCsv(const std::vector<DelayResidual>& curve);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_TOOLS_RESULT_FILES_H_

@@ -1,0 +1,147 @@
+#include "tools/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <sstream>
+#include <vector>
+
+#include "core/so3.h"
+#include "estimator/start/axis_permutation.h"
+
+namespace camgyro {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+constexpr size_t kWidth = 96;
+
+__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
+  char text[400];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  return text;
+}
+
+struct Row {
+  const char* name;
+  int index;  // in the state
+  double value;
+  double unit_scale;  // shown = value * unit_scale
+  const char* unit;
+  bool needs_pixels;
+};
+
+std::string TableRow(const Row& row, const Calibration& c, bool attitudes) {
+  const double sigma = row.unit_scale * c.sigma()[row.index];
+  if (attitudes && row.needs_pixels) return "";
+  // Two digits of the sigma.
+  const int decimals =
+      sigma > 0.0 ? std::min(6, std::max(0, 1 - static_cast<int>(std::floor(std::log10(sigma)))))
+                  : 6;
+  return Format("  %-22s %12.*f ± %-9.*f %-6s%s\n", row.name, decimals, row.unit_scale * row.value,
+                decimals, sigma, row.unit,
+                c.determined[static_cast<size_t>(row.index)]
+                    ? ""
+                    : "  not determined by this motion: kept at the prior");
+}
+
+}  // namespace
+
+std::string ParameterTable(const Calibration& c, bool attitudes) {
+  const NearestPermutation nearest = FindNearestPermutation(c.q_gyro_cam.toRotationMatrix());
+  const Eigen::Quaterniond q_permutation(nearest.P_gyro_cam);
+  const Eigen::Vector3d turn = Log<double>(q_permutation.conjugate() * c.q_gyro_cam);
+  const Eigen::Vector3d& bias = c.bias_gyro_rad_s;
+  const std::vector<Row> rows = {
+      {"focal length", kStateFocal, c.lens[kFocal], 1.0, "px", true},
+      {"principal point x", kStateCx, c.lens[kCx], 1.0, "px", true},
+      {"principal point y", kStateCy, c.lens[kCy], 1.0, "px", true},
+      {"readout time", kStateReadout, c.readout_s, 1e3, "ms", true},
+      {attitudes ? "delay" : "delay of row 0", kStateDelay, c.delay_s, 1e3, "ms", false},
+      {"gyro bias x", kStateBias, bias.x(), kDegrees, "deg/s", false},
+      {"gyro bias y", kStateBias + 1, bias.y(), kDegrees, "deg/s", false},
+      {"gyro bias z", kStateBias + 2, bias.z(), kDegrees, "deg/s", false},
+      {"mounting, about x", kStateRotation, turn.x(), kDegrees, "deg", false},
+      {"mounting, about y", kStateRotation + 1, turn.y(), kDegrees, "deg", false},
+      {"mounting, about z", kStateRotation + 2, turn.z(), kDegrees, "deg", false}};
+  std::string table;
+  for (const Row& row : rows) table += TableRow(row, c, attitudes);
+  return table +
+         "  (t_gyro = t_camera + delay; the mounting is what is left, about the camera's\n"
+         "  axes, after " +
+         DescribePermutation(nearest.P_gyro_cam) + ")\n";
+}
+
+std::string MotionLine(const Recording& recording, const TrackingSummary& tracking) {
+  const ImageMotion motion = MeasureImageMotion(recording);
+  if (motion.pairs == 0) return "";
+  std::string line = Format("matches    %.0f per pair of frames, moving by %.1f px (medians)",
+                            motion.matches, motion.motion_px);
+  if (tracking.seconds > 0.0) line += Format(", %.1f %% outliers", 100.0 * tracking.outlier_ratio);
+  return line + "\n";
+}
+
+std::string StartLine(const StartResult& start) {
+  return Format(
+      "start      delay %.1f ms in the middle row; explains %.0f %% of the gyro's motion; "
+      "runner-up %.2f\n",
+      1e3 * start.delay_middle_row_s, 100.0 * start.explained, start.runner_up_ratio);
+}
+
+std::string QualityLine(const CalibrationReport& report, bool attitudes) {
+  const FitQuality& quality = report.quality;
+  if (attitudes) {
+    return Format("fit        %d rotations, noise %.2f mrad, %.0f %% inliers\n", quality.pairs,
+                  1e3 * quality.noise_px, 100.0 * quality.inlier_ratio);
+  }
+  std::string line = Format("fit        %d pairs, %d matches", quality.pairs, quality.matches);
+  line += Format(", noise %.3f px", quality.noise_px);
+  if (quality.inlier_ratio > 0.0) line += Format(", %.0f %% inliers", 100.0 * quality.inlier_ratio);
+  if (quality.rms_px > 0.0) line += Format(", rms %.3f px", quality.rms_px);
+  if (report.unseen) line += Format(", on unseen frames %.3f px", report.unseen->rms_px);
+  return line + "\n";
+}
+
+std::string TimeLine(const CalibrationReport& report, double tracking_s, size_t frames) {
+  std::string line = "time      ";
+  if (tracking_s > 0.0) {
+    line += Format(" tracking %.1f s (%.0f frames/s),", tracking_s,
+                   static_cast<double>(frames) / tracking_s);
+  }
+  for (const StageTime& time : report.times) {
+    line += Format(" %s %.1f s", time.stage.c_str(), time.seconds);
+    if (time.stage == "window" && time.seconds > 0.0) {
+      line += Format(" (%.0f frames/s)", static_cast<double>(frames) / time.seconds);
+    }
+    line += &time == &report.times.back() ? "" : ",";
+  }
+  return line + "\n";
+}
+
+std::string Notes(const char* label, const std::vector<std::string>& notes) {
+  std::string text;
+  for (const std::string& note : notes) {
+    text += Format("%-11s", label);
+    std::istringstream words(note);
+    std::string word;
+    size_t column = 11;
+    while (words >> word) {
+      if (column > 11 && column + 1 + word.size() > kWidth) {
+        text += "\n" + std::string(11, ' ');
+        column = 11;
+      } else if (column > 11) {
+        text += " ";
+        ++column;
+      }
+      text += word;
+      column += word.size();
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace camgyro

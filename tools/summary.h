@@ -1,0 +1,34 @@
+// What a person reads in the terminal after a calibration.
+#ifndef CAMGYRO_TOOLS_SUMMARY_H_
+#define CAMGYRO_TOOLS_SUMMARY_H_
+
+#include <string>
+#include <vector>
+
+#include "core/recording.h"
+#include "estimator/calibrate.h"
+#include "frontend/track_recording.h"
+
+namespace camgyro {
+
+// Each parameter with value, sigma, unit, and whether this motion determined it.
+std::string ParameterTable(const Calibration& calibration, bool attitudes);
+
+// Matches, their motion, outliers.
+std::string MotionLine(const Recording& recording, const TrackingSummary& tracking);
+
+// The start: delay of the middle row, how much it explains, how unique it is.
+std::string StartLine(const StartResult& start);
+
+// Residuals, inliers, unseen frames.
+std::string QualityLine(const CalibrationReport& report, bool attitudes);
+
+// Seconds per stage, and per frame of the online pass.
+std::string TimeLine(const CalibrationReport& report, double tracking_s, size_t frames);
+
+// "  note: ..." lines, wrapped; empty without notes.
+std::string Notes(const char* label, const std::vector<std::string>& notes);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_TOOLS_SUMMARY_H_

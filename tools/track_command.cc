@@ -1,0 +1,81 @@
+// `camgyro track RECORDING`: only the frontend.
+#include <gflags/gflags.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <sstream>
+
+#include "frontend/track_recording.h"
+#include "tools/commands.h"
+#include "tools/recording_input.h"
+#include "tools/result_files.h"
+#include "tools/summary.h"
+
+DECLARE_string(out);
+DECLARE_bool(quiet);
+DEFINE_int32(max_points, 200, "corners followed per frame");
+
+namespace camgyro {
+namespace {
+
+std::string TracksCsv(const Recording& recording) {
+  std::ostringstream out;
+  out << "#timestamp [ns],track_id,u [px],v [px]\n";
+  out.precision(4);
+  out << std::fixed;
+  for (size_t i = 0; i < recording.tracks.size(); ++i) {
+    for (const TrackedPoint& point : recording.tracks[i]) {
+      out << recording.frames[i].stamp_ns << "," << point.track_id << "," << point.px.x() << ","
+          << point.px.y() << "\n";
+    }
+  }
+  return out.str();
+}
+
+Status RunTrack(const std::vector<std::string>& arguments) {
+  if (FLAGS_max_points < 1) return BadUsage("--max_points: expected at least 1");
+  if (FLAGS_out.empty() && !std::filesystem::is_directory(arguments[0])) {
+    return BadUsage("track: a recording that is not a folder needs --out=DIR");
+  }
+  FileSet files(FLAGS_out.empty() ? arguments[0] : FLAGS_out);
+  if (Status writable = files.CheckWritable(); !writable) return writable;
+  Result<Recording> recording = OpenRecording(arguments[0]);
+  if (!recording) return tl::unexpected(recording.error());
+  if (!recording->HasImages()) {
+    return BadInput(recording->path + ": has neither images nor a video to track in");
+  }
+  TrackerOptions options;
+  options.max_points = FLAGS_max_points;
+  Result<TrackingSummary> summary;
+  {
+    ProgressBar bar;
+    summary = TrackRecording(
+        options, nullptr, [&](double done) { bar.Show("tracking", done); }, &*recording);
+  }
+  if (!summary) return tl::unexpected(summary.error());
+  files.Add("cam0/tracks.csv", TracksCsv(*recording));
+  if (Status written = files.Write(); !written) return written;
+  if (FLAGS_quiet) return {};
+  std::printf("%s: %s\n%s%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),
+              Notes("input", recording->notes).c_str(), MotionLine(*recording, *summary).c_str());
+  std::printf("time       %.1f s, %.0f frames/s\nwritten    %s/cam0/tracks.csv\n", summary->seconds,
+              static_cast<double>(recording->frames.size()) / summary->seconds,
+              files.folder().c_str());
+  return {};
+}
+
+}  // namespace
+
+Command TrackCommand() {
+  Command command;
+  command.name = "track";
+  command.arguments = "RECORDING";
+  command.summary =
+      "follows corners through the pictures: writes cam0/tracks.csv into the recording (or --out), "
+      "where other commands take it instead of the pictures";
+  command.flags = {"out", "max_points", "quiet"};
+  command.run = RunTrack;
+  return command;
+}
+
+}  // namespace camgyro
