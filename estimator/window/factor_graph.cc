@@ -243,7 +243,7 @@ int FactorGraph::Marginalize(const std::vector<BlockId>& leaving) {
           for (int c = linear.offsets[i]; c < linear.offsets[i + 1]; ++c) order.push_back(c);
           continue;
         }
-        CHECK(block.geometry != Geometry::kDirection) << "a direction belongs to one pair only";
+        CHECK(block.geometry != Geometry::kDirection) << "a direction leaves with its pair";
         staying.push_back(linear.blocks[i]);
         int column = linear.offsets[i];
         const int size =
