@@ -61,9 +61,7 @@ void SlidingWindow::ProcessPending() {
 }
 
 void SlidingWindow::Process(const Pending& pair) {
-  const bool solve = settled_ || num_used_ % options_.unsettled_stride == 0 ||
-                     graph_.num_pairs() >= options_.unsettled_pairs;
-  if (!solve) return;
+  if (!settled_ && num_used_ % options_.unsettled_stride != 0) return;
   if (!settled_) {
     // The estimate still moves: the directions with it.
     for (const int64_t id : graph_.pair_ids()) graph_.Residuals(id, /*search=*/true);
@@ -84,7 +82,8 @@ void SlidingWindow::Process(const Pending& pair) {
   latest_ = {pair.stamp_b_ns, estimate, noise_px_, settled_};
   if (listener_) listener_(latest_);
 
-  const int keep = settled_ ? options_.window_pairs : options_.unsettled_pairs - 1;
+  const int keep =
+      settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.unsettled_stride;
   if (graph_.num_pairs() <= keep) return;
   while (graph_.num_pairs() > keep) graph_.MarginalizeOldest();
   graph_.ForgetOldRates();
