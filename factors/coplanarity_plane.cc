@@ -39,7 +39,7 @@ CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
   CHECK_GT(pair_->sigma_px, 0.0);
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   set_num_residuals(static_cast<int>(pair_->matches.size()));
-  *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3};
+  *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3, 3};
   for (const int size : pair_->rate_group_sizes) {
     mutable_parameter_block_sizes()->push_back(3 * size);
   }
@@ -56,22 +56,31 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
     return false;
   }
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
+  const Eigen::Vector3d turn = Eigen::Map<const Eigen::Vector3d>(parameters[kTurnBlock]);
+  const double readout = parameters[1][kReadout];
   PairRow row(chain.size());
   for (size_t i = 0; i < pair.matches.size(); ++i) {
     const Bearing& a = bearings.a[i];
     const Bearing& b = bearings.b[i];
-    const PlaneResidual r = EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau,
-                                                  pair.variance_a(), pair.variance_b());
+    const double share = RowShare(pair, pair.matches[i]);
+    const PlaneResidual r =
+        EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
+                              tau + readout * share * turn, pair.variance_a(), pair.variance_b());
     const RobustResidual robust = Robustify(r.value, pair.robust_threshold);
     residuals[i] = robust.value;
     if (jacobians == nullptr) continue;
     row.Clear();
     row.Add(a, chain, pair.height_px, r.by_a, r.by_J_a);
     row.Add(b, chain, pair.height_px, r.by_b, r.by_J_b);
+    row.AddReadout(share * r.by_tau.dot(turn));
     row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair.rate_group_sizes,
               kFirstRateGroup, jacobians);
     if (jacobians[kTauBlock] != nullptr) {
       Eigen::Map<Eigen::Vector3d>(jacobians[kTauBlock] + 3 * i) = robust.derivative * r.by_tau;
+    }
+    if (jacobians[kTurnBlock] != nullptr) {
+      Eigen::Map<Eigen::Vector3d>(jacobians[kTurnBlock] + 3 * i) =
+          robust.derivative * readout * share * r.by_tau;
     }
   }
   return true;

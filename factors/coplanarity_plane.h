@@ -25,21 +25,28 @@ PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matri
                                     const Eigen::Vector3d& tau, double variance_a,
                                     double variance_b);
 
-// All matches of a pair against one plane.
+// All matches of a pair against one plane, that may turn with the rows.
 //
-//   r_i = Robustify( tau . n_i / sigma_i ),  n_i = (R_i f_i) x (R'_i f'_i)          eq. (4)
+//   r_i = Robustify( tau_i . n_i / sigma_i ),  n_i = (R_i f_i) x (R'_i f'_i)          eq. (4)
+//   tau_i = tau + s_i turn,   s_i = t_r / (t_b - t_a) * ((v_i + v'_i) / 2h - 1/2)
+//
+// Eq. (4) takes one translation direction for the whole pair. With a rolling shutter the top rows
+// of the two frames are joined by an earlier stretch of the path than the bottom rows; where the
+// path bends, their directions differ by the bend over t_r. `turn` is that change per interval of
+// the pair; it has no effect with a global shutter.
 //
 // Parameters  lens         8   LensParameters
 //             shutter      2   t_d [s], t_r [s]
 //             q_gyro_cam   4   RotationManifold
 //             tau          3   SphereManifold<3>: translation direction in the pair's reference,
 //                              the gyro frame at the first rate (sign without meaning)
+//             turn         3   change of tau over the interval of the pair [rad]; give it a prior
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    one per match, in sigmas. sigma_i is propagated through lens, readout and rotation,
 //             and differentiated with them.
 // Valid       while every pixel has a ray; otherwise the step is rejected
-// Source      Jia & Evans eq. (2)-(6); design.md section 3. Neglects: translation direction that
-//             changes within the pair, second-order noise
+// Source      Jia & Evans eq. (2)-(6); design.md section 3 and 5. Neglects: second-order noise,
+//             directions that bend within the readout
 class CoplanarityPlane final : public ceres::CostFunction {
  public:
   explicit CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair);
@@ -48,7 +55,14 @@ class CoplanarityPlane final : public ceres::CostFunction {
                 double** jacobians) const override;
 
   static constexpr int kTauBlock = 3;
-  static constexpr int kFirstRateGroup = 4;
+  static constexpr int kTurnBlock = 4;
+  static constexpr int kFirstRateGroup = 5;
+
+  // s_i of a match, per second of readout.
+  static double RowShare(const PairMeasurement& pair, const Match& match) {
+    return (0.5 * (match.px_a.y() + match.px_b.y()) / pair.height_px - 0.5) /
+           (pair.time_b_s - pair.time_a_s);
+  }
 
  private:
   const std::shared_ptr<const PairMeasurement> pair_;

@@ -31,7 +31,8 @@ struct PairMeasurement {
 };
 
 // Order of the parameter blocks of the coplanarity factors:
-//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>),] rate groups
+//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>), turn 3,] rate
+//   groups
 // q_gyro_cam is stored [x y z w].
 
 struct PairBearings {
@@ -62,6 +63,8 @@ class PairRow {
            const Eigen::Vector3d& by_ray, const Eigen::Matrix<double, 3, 2>& by_J_ray_px) {
     Backpropagate(bearing, chain, height_px, by_ray, by_J_ray_px, &gradient_, by_rates_);
   }
+  // Adds a derivative by the readout time that does not come through a bearing.
+  void AddReadout(double by_readout) { gradient_.by_shutter[kReadout] += by_readout; }
   // Writes the row, times `scale`, to the Jacobians of lens, shutter, rotation and rate groups.
   // Entries of `jacobians` may be null (constant blocks). first_rate_group: index of that block.
   void Write(int row, double scale, const double* q_gyro_cam, const std::vector<int>& group_sizes,

@@ -11,12 +11,12 @@
 #include "tools/summary.h"
 
 DEFINE_string(out, "",
-              "folder of the result, made if absent (calibrate: ./calibration; track: the "
-              "recording; delay: no files)");
+              "folder to write into, made if absent; without: ./calibration (calibrate), the "
+              "recording (track), no files (delay)");
 DEFINE_string(estimator, "window", "online estimator: window");
 DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");
 DEFINE_bool(refine, true,
-            "end with all frames in one problem; without, the online estimate is the result");
+            "skip the last step, all frames in one problem: the online estimate is the result");
 DEFINE_double(search_s, 2.0, "half range of the delay search");
 DECLARE_bool(quiet);
 
@@ -70,7 +70,7 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   files.Add("calibration.yaml", CalibrationYaml(*report, attitudes));
   if (Status written = files.Write(); !written) return written;
 
-  std::printf("%s", ParameterTable(report->calibration, attitudes).c_str());
+  std::printf("\n%s", ParameterTable(report->calibration, attitudes).c_str());
   if (!FLAGS_quiet) {
     std::printf("\n%s%s%s%s%s%s", MotionLine(*recording, *tracking).c_str(),
                 StartLine(report->start).c_str(), QualityLine(*report, attitudes).c_str(),
@@ -88,9 +88,8 @@ Command CalibrateCommand() {
   command.name = "calibrate";
   command.arguments = "RECORDING";
   command.summary =
-      "focal length, readout time, delay, mounting and gyro bias of a recording: with their "
-      "uncertainty, into calibration.yaml (trace.csv: the online estimate over time; delay.csv: "
-      "the delay search)";
+      "focal length, readout time, delay, mounting and gyro bias: with their uncertainty, into "
+      "calibration.yaml (trace.csv: the online estimate over time; delay.csv: the delay search)";
   command.flags = {"out", "residual", "estimator", "refine"};
   for (const std::string& name : GuessFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"search_s", "quiet"});

@@ -143,7 +143,8 @@ std::string CommandHelp(const Command& command) {
     if (info.type == "bool") {
       left = info.default_value == "true" ? "  --no" + name : left;
     } else {
-      left += "=" + info.default_value;
+      const bool none = info.default_value.empty() || info.default_value == "0";
+      left += "=" + (none ? (info.type == "string" ? "DIR" : "NUMBER") : info.default_value);
     }
     left += left.size() + 2 > kFlagColumn ? "\n" + std::string(kFlagColumn, ' ')
                                           : std::string(kFlagColumn - left.size(), ' ');

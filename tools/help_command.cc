@@ -3,6 +3,11 @@
 #include "tools/commands.h"
 
 namespace camgyro {
+namespace {
+
+constexpr size_t kUsageWidth = 40;  // the longest is simulate's
+
+}  // namespace
 
 std::vector<Command> AllCommands() {
   return {CalibrateCommand(), DelayCommand(), TrackCommand(), SimulateCommand(), HelpCommand()};
@@ -25,7 +30,7 @@ std::string ProgramHelp() {
       "camgyro: calibrates and synchronises a rolling-shutter camera with a gyroscope\n\n";
   for (const Command& command : AllCommands()) {
     const std::string usage = command.name + " " + command.arguments;
-    help += "  camgyro " + usage + std::string(usage.size() < 28 ? 28 - usage.size() : 1, ' ');
+    help += "  camgyro " + usage + std::string(kUsageWidth - usage.size(), ' ');
     help += command.summary.substr(0, command.summary.find(':')) + "\n";
   }
   help +=

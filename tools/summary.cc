@@ -41,11 +41,12 @@ std::string TableRow(const Row& row, const Calibration& c, bool attitudes) {
   const int decimals =
       sigma > 0.0 ? std::min(6, std::max(0, 1 - static_cast<int>(std::floor(std::log10(sigma)))))
                   : 6;
-  return Format("  %-22s %12.*f ± %-9.*f %-6s%s\n", row.name, decimals, row.unit_scale * row.value,
-                decimals, sigma, row.unit,
-                c.determined[static_cast<size_t>(row.index)]
-                    ? ""
-                    : "  not determined by this motion: kept at the prior");
+  const bool determined = c.determined[static_cast<size_t>(row.index)];
+  return Format("  %-22s %12.*f ± %-9.*f ", row.name, decimals, row.unit_scale * row.value,
+                decimals, sigma) +
+         (determined ? std::string(row.unit)
+                     : Format("%-6s not determined by this motion: kept at the prior", row.unit)) +
+         "\n";
 }
 
 }  // namespace
@@ -86,9 +87,10 @@ std::string MotionLine(const Recording& recording, const TrackingSummary& tracki
 
 std::string StartLine(const StartResult& start) {
   return Format(
-      "start      delay %.1f ms in the middle row; explains %.0f %% of the gyro's motion; "
-      "runner-up %.2f\n",
-      1e3 * start.delay_middle_row_s, 100.0 * start.explained, start.runner_up_ratio);
+      "start      delay %.1f ms in the middle row explains %.0f %% of the gyro's motion; "
+      "next best: %.0f x as bad\n",
+      1e3 * start.delay_middle_row_s, 100.0 * start.explained,
+      1.0 / std::max(1e-3, start.runner_up_ratio));
 }
 
 std::string QualityLine(const CalibrationReport& report, bool attitudes) {

@@ -83,6 +83,24 @@ Refined Refine(const PairBearings& bearings, double variance_a, double variance_
 
 }  // namespace
 
+double CostOfPointsBehind(const PairBearings& bearings, double variance_a, double variance_b,
+                          double robust_threshold, const Vector3d& tau, size_t stride) {
+  // With a and b turned to one orientation, the depth along a has the sign of (tau x b).(a x b).
+  int in_front = 0, behind = 0;
+  for (size_t i = 0; i < bearings.a.size(); i += stride) {
+    const Vector3d &a = bearings.a[i].ray_ref, &b = bearings.b[i].ray_ref;
+    const Vector3d along = tau.cross(b);
+    const double parallax = along.dot(a.cross(b));
+    const double variance =
+        variance_a * (bearings.a[i].J_ray_px.transpose() * b.cross(along)).squaredNorm() +
+        variance_b * (bearings.b[i].J_ray_px.transpose() * along.cross(a)).squaredNorm();
+    if (parallax * parallax < 4.0 * variance) continue;
+    ++(parallax > 0.0 ? in_front : behind);
+  }
+  const double outlier = robust_threshold > 0.0 ? robust_threshold * robust_threshold : 9.0;
+  return outlier * std::min(in_front, behind);
+}
+
 DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
                                 double robust_threshold) {
   static const std::vector<Vector3d> grid = HalfSphere(120);
@@ -98,10 +116,14 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
   }
   // Some 30 matches rank the candidates well enough; the refinement uses them all.
   const size_t stride = std::max<size_t>(1, n / 30);
+  const auto total_cost = [&](double cost, const Vector3d& tau, size_t step) {
+    return cost + CostOfPointsBehind(bearings, variance_a, variance_b, robust_threshold, tau, step);
+  };
   std::vector<std::pair<double, size_t>> ranked;
   for (size_t c = 0; c < candidates.size(); ++c) {
-    ranked.emplace_back(
-        Cost(bearings, variance_a, variance_b, robust_threshold, candidates[c], stride), c);
+    const double cost =
+        Cost(bearings, variance_a, variance_b, robust_threshold, candidates[c], stride);
+    ranked.emplace_back(total_cost(cost, candidates[c], stride), c);
   }
   const size_t starts = std::min<size_t>(3, ranked.size());
   std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(starts),
@@ -110,9 +132,10 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
   for (size_t s = 0; s < starts; ++s) {
     const Refined refined =
         Refine(bearings, variance_a, variance_b, robust_threshold, candidates[ranked[s].second]);
-    if (s == 0 || refined.cost < best.cost) {
+    const double cost = total_cost(refined.cost, refined.tau, 1);
+    if (s == 0 || cost < best.cost) {
       best.tau = refined.tau;
-      best.cost = refined.cost;
+      best.cost = cost;
     }
   }
   best.residuals.reserve(n);

@@ -17,10 +17,17 @@ struct DirectionEstimate {
 };
 
 // Minimises the robust plane residuals over the unit sphere: cost on a fixed grid of directions
-// and at the cross products of some pairs of matches, then Gauss-Newton with the derivative of
-// sigma from the best three, to the accuracy that a joint solve can start from. Deterministic.
+// and at the cross products of some pairs of matches, each point behind the camera counted as an
+// outlier, then Gauss-Newton with the derivative of sigma from the best three, to the accuracy that
+// a joint solve can start from. Deterministic.
 DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
                                 double robust_threshold);
+
+// Cost of a direction beyond its residuals [sigmas^2]: matches that
+// would lie behind the camera count as outliers, for the sign of tau that leaves fewer of them.
+// Counted where the parallax is beyond 2 sigma.
+double CostOfPointsBehind(const PairBearings& bearings, double variance_a, double variance_b,
+                          double robust_threshold, const Eigen::Vector3d& tau, size_t stride = 1);
 
 }  // namespace camgyro
 

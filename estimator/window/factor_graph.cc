@@ -170,7 +170,27 @@ FactorGraph::CovarianceReport FactorGraph::Covariance(
   const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
       linear.J.num_rows, linear.J.num_cols, static_cast<Eigen::Index>(linear.J.values.size()),
       linear.J.rows.data(), linear.J.cols.data(), linear.J.values.data());
-  const Eigen::SparseMatrix<double> information = J.transpose() * J;
+  // J^T J factor by factor: the rows of one factor have the same columns, so that each is a small
+  // dense product (a general sparse product took a quarter of the online pass).
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::MatrixXd dense;
+  for (Eigen::Index row = 0, f = 0; row < J.rows(); ++f) {
+    const Eigen::Index rows = factors[static_cast<size_t>(f)]->cost->num_residuals();
+    const int begin = linear.J.rows[static_cast<size_t>(row)];
+    const int count = linear.J.rows[static_cast<size_t>(row) + 1] - begin;
+    const int* const cols = linear.J.cols.data() + begin;
+    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
+        block(linear.J.values.data() + begin, rows, count);
+    dense.noalias() = block.transpose() * block;
+    for (int j = 0; j < count; ++j) {
+      for (int i = 0; i < count; ++i) {
+        if (cols[i] >= cols[j]) entries.emplace_back(cols[i], cols[j], dense(i, j));
+      }
+    }
+    row += rows;
+  }
+  Eigen::SparseMatrix<double> information(n, n);  // lower triangle
+  information.setFromTriplets(entries.begin(), entries.end());
 
   Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(functionals.size()));
   for (size_t i = 0; i < functionals.size(); ++i) {
@@ -243,7 +263,7 @@ int FactorGraph::Marginalize(const std::vector<BlockId>& leaving) {
           for (int c = linear.offsets[i]; c < linear.offsets[i + 1]; ++c) order.push_back(c);
           continue;
         }
-        CHECK(block.geometry != Geometry::kDirection) << "a direction belongs to one pair only";
+        CHECK(block.geometry != Geometry::kDirection) << "a direction leaves with its pair";
         staying.push_back(linear.blocks[i]);
         int column = linear.offsets[i];
         const int size =

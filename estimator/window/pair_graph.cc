@@ -14,6 +14,7 @@
 #include "factors/gyro_rate.h"
 #include "factors/marginal_prior.h"
 #include "factors/relative_rotation.h"
+#include "factors/robust.h"
 
 namespace camgyro {
 namespace {
@@ -24,6 +25,7 @@ const BlockId kRotationBlock{BlockKind::kRotation, 0};
 BlockId BiasBlock(int64_t index) { return {BlockKind::kBias, index}; }
 BlockId RatesBlock(int64_t index) { return {BlockKind::kRates, index}; }
 BlockId DirectionBlock(int64_t index) { return {BlockKind::kDirection, index}; }
+BlockId TurnBlock(int64_t index) { return {BlockKind::kTurn, index}; }
 
 // A gap of the gyro: longer than several sampling intervals.
 constexpr double kGapIntervals = 5.0;
@@ -68,6 +70,9 @@ PairGraph::PairGraph(const Calibration& start, const Calibration& prior_mean,
                    {kLensBlock, kShutterBlock, kRotationBlock});
   prior_mean_.prior_sigma = sigma;
   start_bias_ = start.bias_gyro_rad_s;
+  turn_prior_ = std::make_shared<MarginalPrior>(
+      std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(3), false}},
+      Eigen::MatrixXd::Identity(3, 3) / options_.turn_sigma_rad, Eigen::VectorXd::Zero(3));
 }
 
 void PairGraph::AddRate(const TimedRate& rate) {
@@ -200,6 +205,9 @@ AddPairResult PairGraph::AddPair(int64_t id, double time_a_s, double time_b_s,
   if (options_.residual == ResidualKind::kPlane) {
     graph_.AddBlock(DirectionBlock(id), {Geometry::kDirection, Eigen::Vector3d::UnitZ(), {}});
     blocks.push_back(DirectionBlock(id));
+    graph_.AddBlock(TurnBlock(id), {Geometry::kEuclidean, Eigen::Vector3d::Zero(), {}});
+    blocks.push_back(TurnBlock(id));
+    graph_.AddFactor(turn_prior_, {TurnBlock(id)});
   }
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
   if (options_.residual == ResidualKind::kPlane) {
@@ -252,7 +260,10 @@ void PairGraph::MarginalizeOldest() {
   // The last group stays: the next pair will start inside it.
   if (!groups_.empty()) still_needed.insert(groups_.rbegin()->first);
   std::vector<BlockId> leaving;
-  if (graph_.Has(DirectionBlock(oldest->first))) leaving.push_back(DirectionBlock(oldest->first));
+  if (graph_.Has(DirectionBlock(oldest->first))) {
+    leaving.push_back(DirectionBlock(oldest->first));
+    leaving.push_back(TurnBlock(oldest->first));
+  }
   for (auto it = groups_.begin(); it != groups_.end() && still_needed.count(it->first) == 0;) {
     leaving.push_back(RatesBlock(it->first));
     it = groups_.erase(it);
@@ -319,18 +330,29 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const RotationChain chain(m.rate_times_s, GatherRates(m.rate_group_sizes, p.data() + 3));
   PairBearings bearings;
   if (!EvaluatePairBearings(m, chain, p[0], p[1], p[2], false, &bearings)) return residuals;
-  if (search || options_.residual != ResidualKind::kPlane) {
-    const DirectionEstimate direction =
-        FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold);
-    if (graph_.Has(DirectionBlock(id))) graph_.value(DirectionBlock(id)) = direction.tau;
-    return direction.residuals;
+  if (options_.residual != ResidualKind::kPlane) {
+    return FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold).residuals;
   }
-  const Eigen::Vector3d tau = graph_.value(DirectionBlock(id));
+  const Eigen::Vector3d tau = graph_.value(DirectionBlock(id)), turn = graph_.value(TurnBlock(id));
+  double cost = 0.0;
   for (size_t i = 0; i < m.matches.size(); ++i) {
+    const double share = p[1][kReadout] * CoplanarityPlane::RowShare(m, m.matches[i]);
     residuals.push_back(EvaluatePlaneResidual(bearings.a[i].ray_ref, bearings.a[i].J_ray_px,
-                                              bearings.b[i].ray_ref, bearings.b[i].J_ray_px, tau,
-                                              m.variance_a(), m.variance_b())
+                                              bearings.b[i].ray_ref, bearings.b[i].J_ray_px,
+                                              tau + share * turn, m.variance_a(), m.variance_b())
                             .value);
+    const double robust = Robustify(residuals.back(), m.robust_threshold).value;
+    cost += robust * robust;
+  }
+  if (search) {
+    const DirectionEstimate found =
+        FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold);
+    cost += CostOfPointsBehind(bearings, m.variance_a(), m.variance_b(), m.robust_threshold, tau);
+    if (found.cost < cost) {
+      graph_.value(DirectionBlock(id)) = found.tau;
+      graph_.value(TurnBlock(id)).setZero();
+      return found.residuals;
+    }
   }
   return residuals;
 }

@@ -23,8 +23,10 @@ enum class ResidualKind { kPlane, kDeterminant };
 struct PairGraphOptions {
   ResidualKind residual = ResidualKind::kPlane;
   MatchNoise match_noise = MatchNoise::kBothImages;
-  double sigma_px = 1.0;            // of the pairs added from now on
-  double robust_threshold = 2.5;    // in sigmas; 0: none
+  double sigma_px = 1.0;          // of the pairs added from now on
+  double robust_threshold = 2.5;  // in sigmas; 0: none
+  // Prior of the bend of the path: change of the translation direction over one pair [rad].
+  double turn_sigma_rad = 0.05;
   // White noise of one gyro sample per axis (Jia & Evans section V.C); see GyroSigma.
   Eigen::Vector3d gyro_sigma_rad_s = Eigen::Vector3d::Constant(0.003);
   double bias_walk_rad_s2_rtHz = 1e-4;
@@ -77,8 +79,8 @@ class PairGraph {
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
   std::vector<int64_t> pair_ids() const;
 
-  // Whitened residuals of a pair at the present estimate, without loss. Plane: with its direction
-  // minimised anew when `search` is set (and stored). Empty if a ray is missing.
+  // Whitened residuals of a pair at the present estimate, without loss. With `search`, its
+  // direction is first searched anew, and stored if it is better. Empty if a ray is missing.
   std::vector<double> Residuals(int64_t id, bool search);
   // Sets the noise of a pair already in the graph: pixels, or radians of a rotation.
   void SetSigma(int64_t id, double sigma);
@@ -121,6 +123,7 @@ class PairGraph {
   Calibration prior_mean_;
   Eigen::Vector3d start_bias_ = Eigen::Vector3d::Zero();  // value of the first bias block
   FactorGraph graph_;
+  std::shared_ptr<const ceres::CostFunction> turn_prior_;  // one for all pairs
   std::deque<TimedRate> samples_;
   int64_t first_sample_ = 0;  // absolute number of samples_.front()
   double median_interval_s_ = 0.0;

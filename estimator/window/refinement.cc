@@ -27,10 +27,11 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
   };
   double scale = rotations ? options.sigma_rad : graph_options.sigma_px;
   const auto set_scale = [&](double relative) {
-    scale *= std::max(1e-3, relative); if (getenv("FLOOR")) scale=std::max(scale,atof(getenv("FLOOR")));
+    scale *= std::max(1e-3, relative);
+    if (getenv("FLOOR")) scale = std::max(scale, atof(getenv("FLOOR")));
     for (const int64_t id : ids) graph->SetSigma(id, scale);
   };
-  double built_at_delay_s = 0.0;
+  double built_at_delay_s = 0.0, last_cost = 0.0;
   for (result.rounds = 1; result.rounds <= options.max_rounds; ++result.rounds) {
     const Calibration before = result.calibration;
     // Rates are kept around the pairs as the delay was when they were added.
@@ -67,18 +68,22 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     // Every round searches the directions anew: with the calibration of the round before, another
     // minimum may be the right one (little parallax has several).
     if (!rotations && result.rounds > 1) all_residuals(/*search=*/true);
-    const SolveReport report = graph->Solve({15, 1e-6});
+    const SolveReport report = graph->Solve({15, 1e-5});
     if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
     const auto residuals = all_residuals(/*search=*/false);
     const double relative_scale = RobustScale(residuals, lost);
     result.calibration = graph->Estimate();
     const StateVector moved = Difference(result.calibration, before);
-    const bool scale_settled = getenv("FLOOR") || std::abs(relative_scale - 1.0) < 0.03;
-    if (!scale_settled && result.rounds < options.max_rounds) {
+    const bool last = result.rounds == options.max_rounds;
+    if (std::abs(relative_scale - 1.0) > 0.03 && !last) {
       set_scale(relative_scale);
       continue;
     }
+    // Where the next round would start from is not worth a covariance; the end is.
+    const bool costs_settled = std::abs(report.final_cost - last_cost) < 2e-4 * report.final_cost;
+    last_cost = report.final_cost;
+    if (!costs_settled && !last) continue;
     if (!graph->EstimateCovariance(options.cluster_s, &result.calibration)) {
       return CannotEstimate("the information matrix is singular");
     }
@@ -98,10 +103,8 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     }
     q.rms_px = scale * std::sqrt(sum_sq / std::max(1, q.matches));
     q.inlier_ratio = static_cast<double>(inliers) / std::max(1, q.matches);
-    if ((moved.cwiseAbs().array() < 0.2 * result.calibration.sigma().array()).all()) {
-      result.converged = true;
-      break;
-    }
+    result.converged = (moved.cwiseAbs().array() < 0.3 * result.calibration.sigma().array()).all();
+    if (result.converged) break;
   }
   return result;
 }

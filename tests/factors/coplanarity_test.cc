@@ -11,7 +11,7 @@
 namespace camgyro {
 namespace {
 
-using Jet = ceres::Jet<double, 65>;  // 8 + 2 + 4 + 3 + 48 parameters of the scene
+using Jet = ceres::Jet<double, 68>;  // 8 + 2 + 4 + 3 + 3 + 48 parameters of the scene
 
 std::vector<double> Residuals(const ceres::CostFunction& factor,
                               const std::vector<double*>& parameters) {
@@ -26,6 +26,7 @@ std::vector<Jet> SceneJets(const PairScene& s) {
   values.insert(values.end(), s.shutter.data(), s.shutter.data() + 2);
   values.insert(values.end(), s.q_gyro_cam.coeffs().data(), s.q_gyro_cam.coeffs().data() + 4);
   values.insert(values.end(), s.tau.data(), s.tau.data() + 3);
+  values.insert(values.end(), s.turn.data(), s.turn.data() + 3);
   for (const auto& group : s.rate_groups) {
     values.insert(values.end(), group.data(), group.data() + group.size());
   }
@@ -57,7 +58,7 @@ void ExpectMatchesReference(const ceres::CostFunction& factor, PairScene* s, boo
     int offset = 0;
     for (size_t block = 0; block < sizes.size(); ++block) {
       const int size = sizes[block];
-      if (!with_tau && block == CoplanarityPlane::kTauBlock) offset += 3;
+      if (!with_tau && block == CoplanarityPlane::kTauBlock) offset += 6;  // tau and turn
       const Eigen::VectorXd want = expected.v.segment(offset, size);
       const Eigen::VectorXd have =
           Eigen::Map<const Eigen::VectorXd>(jacobians[block] + static_cast<int>(row) * size, size);
@@ -125,6 +126,7 @@ TEST(CoplanarityPlane, DoesNotDependOnTheSignOfTau) {
   Disturb(4, &s);
   const auto r = Residuals(CoplanarityPlane(s.pair), s.Parameters());
   s.tau = -s.tau;
+  s.turn = -s.turn;
   const auto r_flipped = Residuals(CoplanarityPlane(s.pair), s.Parameters());
   for (size_t i = 0; i < r.size(); ++i) EXPECT_NEAR(r[i], -r_flipped[i], 1e-12);
 }
@@ -138,8 +140,8 @@ TEST(CoplanarityPlane, JacobianMatchesAutodiffOfThePlainFormula) {
     ExpectMatchesReference(
         CoplanarityPlane(s.pair), &s, true, [&](size_t row, const std::vector<Jet>& x) {
           return reference::Plane<Jet>(*s.pair, s.pair->matches[row], x.data(), x.data() + 8,
-                                       x.data() + 10, {x[14], x[15], x[16]},
-                                       {x.begin() + 17, x.end()});
+                                       x.data() + 10, {x[14], x[15], x[16]}, {x[17], x[18], x[19]},
+                                       {x.begin() + 20, x.end()});
         });
   }
 }
@@ -209,7 +211,7 @@ TEST(CoplanarityDeterminant, JacobianMatchesAutodiffOfThePlainFormula) {
                              }
                              return reference::Determinant<Jet>(*s.pair, matches, x.data(),
                                                                 x.data() + 8, x.data() + 10,
-                                                                {x.begin() + 17, x.end()});
+                                                                {x.begin() + 20, x.end()});
                            });
   }
 }

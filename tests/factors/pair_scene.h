@@ -18,12 +18,16 @@ struct PairScene {
   ShutterParameters shutter;
   Eigen::Quaterniond q_gyro_cam;
   Eigen::Vector3d tau;  // unit, in the reference (gyro frame at the first rate)
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
   std::vector<Eigen::Matrix3Xd> rate_groups;
 
   // Parameter pointers in the order of CoplanarityPlane, or without tau.
   std::vector<double*> Parameters(bool with_tau = true) {
     std::vector<double*> p = {lens.data(), shutter.data(), q_gyro_cam.coeffs().data()};
-    if (with_tau) p.push_back(tau.data());
+    if (with_tau) {
+      p.push_back(tau.data());
+      p.push_back(turn.data());
+    }
     for (auto& group : rate_groups) p.push_back(group.data());
     return p;
   }
@@ -104,6 +108,7 @@ inline void Disturb(uint64_t seed, PairScene* s) {
   s->q_gyro_cam = s->q_gyro_cam * Exp(Eigen::Vector3d(0.02, -0.03, 0.01));
   s->tau = (s->tau + 0.1 * Eigen::Vector3d(normal(generator), normal(generator), normal(generator)))
                .normalized();
+  s->turn << 0.2, -0.1, 0.15;
   for (Match& match : s->pair->matches) {
     match.px_a += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));
     match.px_b += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));

@@ -98,8 +98,11 @@ void RayAndJacobian(const PairMeasurement& pair, const T* lens, const T* shutter
 // Residual of one match against tau, unrobust. parameters as in CoplanarityPlane.
 template <typename T>
 T Plane(const PairMeasurement& pair, const Match& match, const T* lens, const T* shutter,
-        const T* q, const Vec3<T>& tau, const std::vector<T>& rates) {
+        const T* q, const Vec3<T>& tau0, const Vec3<T>& turn, const std::vector<T>& rates) {
   using std::sqrt;
+  const T middle_row((match.px_a.y() + match.px_b.y()) / 2);
+  const T from_middle_s = shutter[1] * (middle_row / T(pair.height_px) - T(0.5));
+  const Vec3<T> tau = tau0 + turn * (from_middle_s / T(pair.time_b_s - pair.time_a_s));
   Vec3<T> a, b;
   Mat32<T> A, B;
   RayAndJacobian(pair, lens, shutter, q, rates, match.px_a, pair.time_a_s, &a, &A);

@@ -1,0 +1,126 @@
+// The commands on a small simulated recording, as a user runs them.
+#include <gmock/gmock.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+
+#include "core/calibration.h"
+#include "tests/tools/run_camgyro.h"
+
+namespace camgyro {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAreArray;
+using testing::HasSubstr;
+
+// f 290 px, t_r 20 ms, t_d 15 ms (defaults of the simulator).
+constexpr char kHandheld[] = R"(
+duration_s: 4
+camera: {resolution: [320, 240], focal_px: 290, rate_hz: 20}
+tracks: {count: 50, noise_px: 0.2}
+)";
+constexpr char kVideo[] = R"(
+duration_s: 0.5
+scene: {kind: room}
+motion: {path_radius_m: 1}
+camera: {resolution: [320, 240], focal_px: 290}
+video: {format: mp4}
+)";
+
+using CommandsTest = CamgyroTest;
+
+TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
+  Simulate(kHandheld, "a");
+  const RunResult run = Run("calibrate a --out=result");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("focal length"), HasSubstr("readout time"), HasSubstr("±"),
+                             HasSubstr("unseen"), HasSubstr("written    result/calibration.yaml")));
+  EXPECT_EQ(run.err, "");  // no progress bar: not a terminal
+
+  const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
+  EXPECT_THAT(result["camera"]["resolution"].as<std::vector<int>>(), ElementsAreArray({320, 240}));
+  const auto expect_near = [](const YAML::Node& node, double truth, double most_sigma) {
+    const double sigma = node["sigma"].as<double>();
+    EXPECT_LT(sigma, most_sigma);
+    EXPECT_NEAR(node["value"].as<double>(), truth, 5.0 * sigma);
+  };
+  expect_near(result["camera"]["focal_px"], 290.0, 3.0);
+  expect_near(result["shutter"]["readout_s"], 0.020, 0.001);
+  expect_near(result["clock"]["delay_s"], 0.015, 0.001);
+  EXPECT_EQ(result["camera"]["principal_px"]["value"].size(), 2u);
+  EXPECT_EQ(result["camera"]["aspect_ratio"]["sigma"].as<double>(), 0.0);
+  EXPECT_EQ(result["camera"]["distortion"]["model"].as<std::string>(), "none");
+  EXPECT_EQ(result["gyro"]["bias_rad_s"]["sigma"].size(), 3u);
+  EXPECT_EQ(result["extrinsics"]["q_gyro_cam_wxyz"]["value"].size(), 4u);
+  EXPECT_EQ(result["extrinsics"]["q_gyro_cam_wxyz"]["sigma_rad"].size(), 3u);
+  EXPECT_EQ(result["effects"].size(), 0u);
+  EXPECT_THAT(result["covariance"]["order"].as<std::vector<std::string>>(),
+              ElementsAreArray(StateNames()));
+  const auto covariance = result["covariance"]["matrix"].as<std::vector<std::vector<double>>>();
+  ASSERT_EQ(covariance.size(), static_cast<size_t>(kStateSize));
+  EXPECT_NEAR(std::sqrt(covariance[kStateDelay][kStateDelay]),
+              result["clock"]["delay_s"]["sigma"].as<double>(), 1e-12);
+  EXPECT_NEAR(result["quality"]["noise_px"].as<double>(), 0.2, 0.03);
+  for (const char* key :
+       {"pairs", "matches", "inlier_ratio", "rms_px", "unseen_rms_px", "unobservable"}) {
+    EXPECT_TRUE(result["quality"][key]) << key;
+  }
+  EXPECT_THAT(ReadFile(Path("result/trace.csv")),
+              testing::StartsWith("#timestamp_ns,focal_px,cx_px,cy_px,readout_s,delay_s,bias_x,"
+                                  "bias_y,bias_z,q_w,q_x,q_y,q_z,sigma_focal_px,"));
+  EXPECT_THAT(ReadFile(Path("result/delay.csv")), testing::StartsWith("#delay_s,unexplained\n"));
+
+  // Again, and quietly: the same bytes.
+  const RunResult again = Run("calibrate a --out=again --quiet");
+  ASSERT_EQ(again.exit_code, 0);
+  for (const char* name : {"calibration.yaml", "trace.csv", "delay.csv"}) {
+    EXPECT_EQ(ReadFile(Path(std::string("again/") + name)),
+              ReadFile(Path(std::string("result/") + name)))
+        << name;
+  }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(Path("again")), {}), 3);
+  EXPECT_LT(again.out.size(), run.out.size());
+}
+
+TEST_F(CommandsTest, DelayFindsTheMiddleRowsDelay) {
+  Simulate(kHandheld, "a");
+  const RunResult run = Run("delay a --out=result");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  double delay_ms = 0.0, sigma_ms = 0.0;
+  ASSERT_EQ(std::sscanf(run.out.c_str(), "delay %lf ± %lf ms", &delay_ms, &sigma_ms), 2);
+  EXPECT_NEAR(delay_ms, 15.0 + 0.5 * 20.0, 3.0);
+  EXPECT_LT(sigma_ms, 3.0);
+  EXPECT_THAT(run.out, AllOf(HasSubstr("unexplained, by delay"), HasSubstr("100 % |")));
+  EXPECT_TRUE(Exists("result/delay.csv"));
+}
+
+TEST_F(CommandsTest, TrackWritesTracksThatReplaceThePictures) {
+  Simulate(kVideo, "a");
+  const RunResult run = Run("track a");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("written    a/cam0/tracks.csv"));
+  const std::string tracks = ReadFile(Path("a/cam0/tracks.csv"));
+  EXPECT_THAT(tracks, testing::StartsWith("#timestamp [ns],track_id,u [px],v [px]\n"));
+  // The same again, from the pictures and not from the tracks that are there now.
+  ASSERT_EQ(Run("track a --out=b").exit_code, 0);
+  EXPECT_EQ(ReadFile(Path("b/cam0/tracks.csv")), tracks);
+}
+
+TEST_F(CommandsTest, TrackNeedsPictures) {
+  Simulate(kHandheld, "a");
+  const RunResult run = Run("track a");
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.err, HasSubstr("neither images nor a video"));
+}
+
+TEST_F(CommandsTest, SimulateMakesARecording) {
+  std::ofstream(Path("a.yaml")) << kHandheld;
+  const RunResult run = Run("simulate a.yaml duration_s=1 --out=a");
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(Exists("a/cam0/tracks.csv"));
+  EXPECT_EQ(Run("simulate a.yaml camera.focal=3 --out=a").exit_code, 3);
+}
+
+}  // namespace
+}  // namespace camgyro
