@@ -1,0 +1,33 @@
+# Install rules: the libraries and their headers for find_package(camgyro), and the program.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# Libraries under tools/ are parts of the program.
+get_property(all_libraries GLOBAL PROPERTY CAMGYRO_LIBRARIES)
+foreach(library ${all_libraries})
+  get_target_property(directory ${library} SOURCE_DIR)
+  if(NOT directory MATCHES "^${PROJECT_SOURCE_DIR}/tools")
+    list(APPEND libraries ${library})
+  endif()
+endforeach()
+install(TARGETS ${libraries} EXPORT camgyroTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+        INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro)
+
+# Included as in this repository: "core/calibration.h". Of the readers only the entrance is public.
+install(DIRECTORY core factors frontend estimator
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro
+        FILES_MATCHING PATTERN "*.h" PATTERN "readers" EXCLUDE)
+install(FILES frontend/readers/read_recording.h
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro/frontend/readers)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/camgyro)
+install(EXPORT camgyroTargets NAMESPACE camgyro:: DESTINATION ${package_dir})
+configure_package_config_file(cmake/camgyroConfig.cmake.in ${PROJECT_BINARY_DIR}/camgyroConfig.cmake
+                              INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/camgyroConfigVersion.cmake
+                                 COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/camgyroConfig.cmake
+              ${PROJECT_BINARY_DIR}/camgyroConfigVersion.cmake
+        DESTINATION ${package_dir})
+
+install(TARGETS camgyro RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

@@ -1,0 +1,36 @@
+#!/bin/bash
+# Installs what camgyro needs to build, test and run on Debian 12: only packages that are missing,
+# and without apt-get if none is. Needs root or sudo for that.
+set -euo pipefail
+
+packages=(
+  # build
+  g++ cmake ninja-build pkg-config ccache clang-format-14
+  # libraries
+  libeigen3-dev libceres-dev libsuitesparse-dev libgflags-dev libgoogle-glog-dev
+  libopencv-dev libavformat-dev libavcodec-dev libswscale-dev libavutil-dev
+  libyaml-cpp-dev libexpected-dev libfast-float-dev
+  # tests
+  libgmock-dev libgtest-dev
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+  [[ $status == installed ]] || missing+=("$package")
+done
+if (( ${#missing[@]} == 0 )); then exit 0; fi
+
+as_root=()
+if (( EUID != 0 )); then
+  if ! command -v sudo >/dev/null; then
+    echo "$0: not root, and no sudo; as root: apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+echo "Installing ${missing[*]}"
+"${as_root[@]}" apt-get -qq update ||
+  echo "apt-get update failed; trying with the package lists as they are" >&2
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+  apt-get -qq -y --no-install-recommends install "${missing[@]}"

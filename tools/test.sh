@@ -1,0 +1,18 @@
+#!/bin/bash
+# tools/test.sh [PRESET [CTEST_OPTION...]]: installs what is missing, builds, and runs the tests.
+# PRESET: release (default), dev, asan, tsan. CAMGYRO_WERROR=ON makes warnings errors.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+preset=${1:-release}
+shift || true
+
+tools/install_deps.sh
+cmake --log-level=WARNING --preset "$preset" -DCAMGYRO_WERROR="${CAMGYRO_WERROR:-OFF}"
+cmake --build --preset "$preset" -j "$(nproc)"
+
+# Tests on measured recordings find them there, and say SKIPPED if they are absent.
+export CAMGYRO_DATA=${CAMGYRO_DATA:-$PWD/../shared/data}
+if [[ ! -d $CAMGYRO_DATA ]]; then
+  echo "*** NO MEASURED RECORDINGS in $CAMGYRO_DATA: every test on measured data is SKIPPED."
+fi
+ctest --preset "$preset" -j "$(nproc)" "$@"
