@@ -28,7 +28,6 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
   double scale = rotations ? options.sigma_rad : graph_options.sigma_px;
   const auto set_scale = [&](double relative) {
     scale *= std::max(1e-3, relative);
-    if (getenv("FLOOR")) scale = std::max(scale, atof(getenv("FLOOR")));
     for (const int64_t id : ids) graph->SetSigma(id, scale);
   };
   double built_at_delay_s = 0.0;
@@ -75,7 +74,7 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     const double relative_scale = RobustScale(residuals, lost);
     result.calibration = graph->Estimate();
     const StateVector moved = Difference(result.calibration, before);
-    const bool scale_settled = getenv("FLOOR") || std::abs(relative_scale - 1.0) < 0.03;
+    const bool scale_settled = std::abs(relative_scale - 1.0) < 0.03;
     if (!scale_settled && result.rounds < options.max_rounds) {
       set_scale(relative_scale);
       continue;
