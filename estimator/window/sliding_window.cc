@@ -40,6 +40,10 @@ AddResult SlidingWindow::AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns,
   pending_.push_back(
       {stamp_b_ns, time_a_s, SecondsSince(origin_ns_, stamp_b_ns), std::move(matches)});
   ProcessPending();
+  if (pending_.size() > kMaxPending) {  // the gyro is silent
+    pending_.pop_front();
+    ++num_skipped_;
+  }
   return AddResult::kAccepted;
 }
 
@@ -56,6 +60,8 @@ void SlidingWindow::ProcessPending() {
     } else {
       ++num_skipped_;
     }
+    // A pair to come starts after this one; its delay may still move, but not by a second.
+    graph_.ForgetOldRates(next.time_a_s + latest_.estimate.delay_s - 1.0);
     pending_.pop_front();
   }
 }
@@ -86,7 +92,6 @@ void SlidingWindow::Process(const Pending& pair) {
       settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.unsettled_stride;
   if (graph_.num_pairs() <= keep) return;
   while (graph_.num_pairs() > keep) graph_.MarginalizeOldest();
-  graph_.ForgetOldRates();
 }
 
 void SlidingWindow::UpdateNoise() {
