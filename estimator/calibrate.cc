@@ -12,7 +12,6 @@
 namespace camgyro {
 namespace {
 
-constexpr int kAttitudeGap = 4;         // frames between two attitudes of one rotation
 constexpr int kMinPairsForUnseen = 60;  // below, setting frames aside costs more than it tells
 
 class StageClock {
@@ -37,10 +36,30 @@ std::string Format(const char* format, double a, double b = 0.0, double c = 0.0,
 
 std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
   std::vector<CameraRotation> rotations;
-  for (const TimedPair& pair : MakeEstimationInput(recording, 1).pairs) {
+  for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
     rotations.push_back(pair.rotation);
   }
   return rotations;
+}
+
+// The start with the field of view scanned; where the scan finds none that it can trust, at the
+// usual one that explains the gyro best, with the focal length left open. Errors: of the scan.
+Result<StartResult> StartFromPictures(const Recording& recording,
+                                      const CameraRotationsAtFocal& rotations_at,
+                                      const CalibrateOptions& options) {
+  const Result<StartResult> scanned =
+      FindStartAndFocal(recording, rotations_at, options.start, options.focal_scan);
+  if (scanned || scanned.error().kind != ErrorKind::kCannotEstimate) return scanned;
+  Result<StartResult> best = scanned;
+  for (const double focal : {0.55, 0.65, 0.8, 1.0}) {  // of the picture's width
+    const Result<StartResult> start =
+        FindStart(recording, rotations_at(focal * recording.camera.width_px), options.start);
+    if (start && (!best || start->explained > best->explained)) best = start;
+  }
+  if (best) {
+    best->notes.push_back("no focal length could be found for the start: a usual one is used");
+  }
+  return best;
 }
 
 // How the two halves of a recording disagree, in view of their covariances: chi-square per
@@ -165,12 +184,12 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   CalibrationReport report;
   StageClock clock(&report.times);
   const bool attitudes = recording.matches.empty() && recording.tracks.empty();
-  const EstimationInput input = MakeEstimationInput(recording, kAttitudeGap);
+  const EstimationInput input = MakeEstimationInput(recording);
 
   tell("start", 0.0);
   const Result<StartResult> start =
       attitudes ? FindStart(recording, NeighbourRotations(recording), options.start)
-                : FindStartAndFocal(recording, rotations_at, options.start, options.focal_scan);
+                : StartFromPictures(recording, rotations_at, options);
   if (!start) return tl::unexpected(start.error());
   report.start = *start;
   report.notes = start->notes;
@@ -300,6 +319,11 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   }
   report.calibration.prior_sigma = prior.prior_sigma;
   MarkDetermined(attitudes, &report.calibration);
+  if (!report.converged) {  // delay and bias come from rates; the rest needs the fit
+    for (const int i : {0, 1, 2, 3, 8, 9, 10}) {  // f, c, t_r, q_c in the order of StateIndex
+      report.calibration.determined[static_cast<size_t>(i)] = false;
+    }
+  }
   if (report.online) report.online->prior_sigma = prior.prior_sigma;
   AddDoubts(recording, &report);
   tell("refinement", 1.0);

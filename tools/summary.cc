@@ -45,7 +45,7 @@ std::string TableRow(const Row& row, const Calibration& c, bool attitudes) {
   return Format("  %-22s %12.*f ± %-9.*f ", row.name, decimals, row.unit_scale * row.value,
                 decimals, sigma) +
          (determined ? std::string(row.unit)
-                     : Format("%-6s not determined by this motion: kept at the prior", row.unit)) +
+                     : Format("%-6s not determined by this recording", row.unit)) +
          "\n";
 }
 

@@ -9,7 +9,7 @@
 
 namespace camgyro {
 
-EstimationInput MakeEstimationInput(const Recording& recording, int attitude_gap) {
+EstimationInput MakeEstimationInput(const Recording& recording) {
   EstimationInput input;
   input.origin_ns = recording.gyro.front().stamp_ns;
   for (const GyroSample& sample : recording.gyro) {
@@ -34,12 +34,12 @@ EstimationInput MakeEstimationInput(const Recording& recording, int attitude_gap
     for (const FramePair& pair : pairs) add(pair.frame_a, pair.frame_b).matches = pair.matches;
   } else {
     const int n = static_cast<int>(recording.q_cam_world.size());
-    for (int a = 0; a + attitude_gap < n; a += attitude_gap) {
-      CameraRotation& rotation = add(a, a + attitude_gap).rotation;
+    for (int a = 0; a + 1 < n; ++a) {
+      CameraRotation& rotation = add(a, a + 1).rotation;
       rotation.frame_a = a;
-      rotation.frame_b = a + attitude_gap;
+      rotation.frame_b = a + 1;
       rotation.q_a_b = recording.q_cam_world[static_cast<size_t>(a)] *
-                       recording.q_cam_world[static_cast<size_t>(a + attitude_gap)].conjugate();
+                       recording.q_cam_world[static_cast<size_t>(a + 1)].conjugate();
     }
   }
   return input;

@@ -25,9 +25,9 @@ struct EstimationInput {
   std::vector<TimedPair> pairs;
 };
 
-// Pairs of neighbouring frames from matches or tracks; attitudes are paired `attitude_gap` frames
-// apart. What is absent gives no pairs.
-EstimationInput MakeEstimationInput(const Recording& recording, int attitude_gap = 1);
+// Pairs of neighbouring frames from matches, tracks or attitudes. (Attitudes further apart move the
+// delay: tablet-attitude D03 by 1 ms for each frame.) What is absent gives no pairs.
+EstimationInput MakeEstimationInput(const Recording& recording);
 
 // White noise of one gyro sample per axis [rad/s]: as declared, else what the samples show while
 // the camera ran (third differences, robust), within [5e-4, 2e-2]. What vibration and sampling add

@@ -199,7 +199,7 @@ TEST(SlidingWindow, WhatTheMotionDoesNotDetermineKeepsItsPrior) {
   window.SetListener(
       [&](const WindowUpdate& update) { sigmas.push_back(update.estimate.sigma()); });
   FeedAll(s.recording, &window);
-  ASSERT_GT(sigmas.size(), 100u);
+  ASSERT_GT(sigmas.size(), 12u);  // an unsettled window is solved every 10 of 149 pairs
   const StateVector prior = StartOffTheTruth(s.truth).prior_sigma;
   const StateVector last = sigmas.back();
   RecordProperty("focal_share", std::to_string(last[kStateFocal] / prior[kStateFocal]));
