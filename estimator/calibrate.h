@@ -43,9 +43,12 @@ struct CalibrationReport {
 
   StartResult start;
   FitQuality quality;
-  // On blocks of frames that were set aside: a fit without them, evaluated on them. The result
-  // itself then uses all frames. Absent for short recordings and for attitudes.
+  // Each half of the recording under the fit of the other half. The result itself uses all frames.
+  // Absent for short recordings and for attitudes.
   std::optional<UnseenFit> unseen;
+  // Disagreement of the fits of the two halves, chi-square per parameter; 0: not tested (short).
+  // Beyond its 99.9 % quantile the covariance is multiplied by it, and a doubt says so.
+  double halves_chi2 = 0.0;
   int skipped_pairs = 0;
   bool converged = false;
 

@@ -62,7 +62,11 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
         CalibrateRecording(*recording, RotationsFrom(*recording), *options,
                            [&](const std::string& stage, double done) { bar.Show(stage, done); });
   }
-  if (!report) return tl::unexpected(report.error());
+  if (!report) return Refusal(*recording, report.error());
+  if (recording->declared_stabilisation) {
+    report->doubts.push_back("the picture was stabilised electronically, says the file (" +
+                             *recording->declared_stabilisation + ")");
+  }
 
   const bool attitudes = HasOnlyAttitudes(*recording);
   files.Add("trace.csv", TraceCsv(report->trace));

@@ -144,7 +144,7 @@ std::string CommandHelp(const Command& command) {
       left = info.default_value == "true" ? "  --no" + name : left;
     } else {
       const bool none = info.default_value.empty() || info.default_value == "0";
-      left += "=" + (none ? (info.type == "string" ? "DIR" : "NUMBER") : info.default_value);
+      left += "=" + (none ? (info.type == "string" ? "..." : "NUMBER") : info.default_value);
     }
     left += left.size() + 2 > kFlagColumn ? "\n" + std::string(kFlagColumn, ' ')
                                           : std::string(kFlagColumn - left.size(), ' ');

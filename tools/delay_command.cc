@@ -138,7 +138,7 @@ Status RunDelay(const std::vector<std::string>& arguments) {
     if (!tracking) return tl::unexpected(tracking.error());
     report = FindDelay(*recording, &bar);
   }
-  if (!report) return tl::unexpected(report.error());
+  if (!report) return Refusal(*recording, report.error());
   const StartResult& start = report->start;
   if (!FLAGS_out.empty()) {
     files.Add("delay.csv", DelayCsv(start.curve));

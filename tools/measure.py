@@ -96,12 +96,13 @@ def with_lens(recording, folder):
 def pair(text, key):
     """value and sigma of `key: {value: .., sigma..: ..}` in calibration.yaml, as lists."""
     match = re.search(r"%s: \{value: (\[[^]]*\]|[^,]*), sigma\w*: (\[[^]]*\]|[^}]*)\}" % key, text)
-    return [[float(x) for x in group.strip("[]").split(",")] for group in match.groups()]
+    return [[float(x.replace(".nan", "nan")) for x in group.strip("[]").split(",")]
+            for group in match.groups()]
 
 
 def scalar(text, key):
     match = re.search(r"^  %s: (\S+)" % key, text, re.MULTILINE)
-    return float(match.group(1)) if match else None
+    return float(match.group(1).replace(".nan", "nan")) if match else None
 
 
 def read_result(folder):

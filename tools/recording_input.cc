@@ -63,6 +63,14 @@ CameraRotationsAtFocal RotationsFrom(const Recording& recording) {
   };
 }
 
+tl::unexpected<Error> Refusal(const Recording& recording, Error error) {
+  if (error.kind == ErrorKind::kCannotEstimate && recording.declared_stabilisation) {
+    error.message = "the picture was stabilised electronically, says the file (" +
+                    *recording.declared_stabilisation + "), and indeed: " + error.message;
+  }
+  return tl::unexpected(std::move(error));
+}
+
 std::string DescribeRecording(const Recording& recording) {
   char text[300];
   const double frame_s = MedianInterval(recording.frames), gyro_s = MedianInterval(recording.gyro);

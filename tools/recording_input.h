@@ -29,6 +29,9 @@ Result<TrackingSummary> EnsureImageMotion(ProgressBar* progress, Recording* reco
 // Rotations between frames at a trial focal length; a copy of the pairs lives in the function.
 CameraRotationsAtFocal RotationsFrom(const Recording& recording);
 
+// An estimator's refusal, with the file's own words where it declares stabilisation.
+tl::unexpected<Error> Refusal(const Recording& recording, Error error);
+
 // One line about what the recording holds.
 std::string DescribeRecording(const Recording& recording);
 

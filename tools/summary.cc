@@ -99,7 +99,9 @@ std::string QualityLine(const CalibrationReport& report, bool attitudes) {
     return Format("fit        %d rotations, noise %.2f mrad, %.0f %% inliers\n", quality.pairs,
                   1e3 * quality.noise_px, 100.0 * quality.inlier_ratio);
   }
-  std::string line = Format("fit        %d pairs, %d matches", quality.pairs, quality.matches);
+  std::string line = Format("fit        %d pairs", quality.pairs);
+  // The online pass counts no matches.
+  if (quality.matches > 0) line += Format(", %d matches", quality.matches);
   line += Format(", noise %.3f px", quality.noise_px);
   if (quality.inlier_ratio > 0.0) line += Format(", %.0f %% inliers", 100.0 * quality.inlier_ratio);
   if (quality.rms_px > 0.0) line += Format(", rms %.3f px", quality.rms_px);

@@ -3,16 +3,21 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <sstream>
 
 #include "frontend/track_recording.h"
 #include "tools/commands.h"
+#include "tools/read_calibration.h"
 #include "tools/recording_input.h"
 #include "tools/result_files.h"
 #include "tools/summary.h"
 
 DECLARE_string(out);
 DECLARE_bool(quiet);
+DEFINE_string(calibration, "",
+              "calibration.yaml of this camera and gyro: the gyro then predicts where corners go, "
+              "and wrong is what is off its epipolar line");
 DEFINE_int32(max_points, 200, "corners followed per frame");
 
 namespace camgyro {
@@ -44,13 +49,20 @@ Status RunTrack(const std::vector<std::string>& arguments) {
   if (!recording->HasImages()) {
     return BadInput(recording->path + ": has neither images nor a video to track in");
   }
+  std::optional<Calibration> calibration;
+  if (!FLAGS_calibration.empty()) {
+    const Result<Calibration> read = ReadCalibration(FLAGS_calibration);
+    if (!read) return tl::unexpected(read.error());
+    calibration = *read;
+  }
   TrackerOptions options;
   options.max_points = FLAGS_max_points;
   Result<TrackingSummary> summary;
   {
     ProgressBar bar;
     summary = TrackRecording(
-        options, nullptr, [&](double done) { bar.Show("tracking", done); }, &*recording);
+        options, calibration ? &*calibration : nullptr,
+        [&](double done) { bar.Show("tracking", done); }, &*recording);
   }
   if (!summary) return tl::unexpected(summary.error());
   files.Add("cam0/tracks.csv", TracksCsv(*recording));
@@ -73,7 +85,7 @@ Command TrackCommand() {
   command.summary =
       "follows corners through the pictures: writes cam0/tracks.csv into the recording (or --out), "
       "where other commands take it instead of the pictures";
-  command.flags = {"out", "max_points", "quiet"};
+  command.flags = {"out", "calibration", "max_points", "quiet"};
   command.run = RunTrack;
   return command;
 }

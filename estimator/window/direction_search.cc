@@ -114,8 +114,8 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
                              .cross(bearings.a[j].ray_ref.cross(bearings.b[j].ray_ref));
     if (tau.norm() > 1e-14) candidates.push_back(tau.normalized());
   }
-  // Some 30 matches rank the candidates well enough; the refinement uses them all.
-  const size_t stride = std::max<size_t>(1, n / 30);
+  // Some 60 matches rank the candidates well enough; the refinement uses them all.
+  const size_t stride = std::max<size_t>(1, n / 60);
   const auto total_cost = [&](double cost, const Vector3d& tau, size_t step) {
     return cost + CostOfPointsBehind(bearings, variance_a, variance_b, robust_threshold, tau, step);
   };

@@ -239,11 +239,13 @@ Linearization FactorGraph::Linearize(const std::vector<FactorKey>& keys) const {
   return result;
 }
 
-int FactorGraph::Marginalize(const std::vector<BlockId>& leaving) {
+int FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
+                             const std::vector<FactorKey>& also) {
   const std::set<BlockId> leaving_set(leaving.begin(), leaving.end());
   std::vector<FactorKey> touched;
   for (const auto& [key, factor] : factors_) {
-    if (std::any_of(factor.blocks.begin(), factor.blocks.end(),
+    if (std::count(also.begin(), also.end(), key) > 0 ||
+        std::any_of(factor.blocks.begin(), factor.blocks.end(),
                     [&](const BlockId& id) { return leaving_set.count(id) > 0; })) {
       touched.push_back(key);
     }

@@ -112,10 +112,10 @@ class FactorGraph {
   // Linearises the given factors by the blocks that they touch (sorted by id).
   Linearization Linearize(const std::vector<FactorKey>& keys) const;
 
-  // Removes `leaving` and every factor that touches them, and adds a MarginalPrior that says the
-  // same about the neighbours. Returns the number of directions of `leaving` that no factor
-  // determined (0 in a sound window). No neighbours: nothing is added.
-  int Marginalize(const std::vector<BlockId>& leaving);
+  // Removes `leaving` and every factor that touches them, and the factors `also`, and adds a
+  // MarginalPrior that says the same about the neighbours. Returns the number of directions of
+  // `leaving` that no factor determined (0 in a sound window). No neighbours: nothing is added.
+  int Marginalize(const std::vector<BlockId>& leaving, const std::vector<FactorKey>& also = {});
 
  private:
   std::map<BlockId, Block> blocks_;

@@ -272,19 +272,14 @@ void PairGraph::MarginalizeOldest() {
   for (const auto& [id, block] : graph_.blocks()) {
     if (id.kind == BlockKind::kBias && id.index < first_bias) leaving.push_back(id);
   }
-  // Determinants have no direction of their own: what they touch may stay, the factor must leave.
-  if (leaving.empty()) {
-    graph_.RemoveFactor(oldest->second.factor);
-  } else {
-    graph_.Marginalize(leaving);
-  }
+  // The pair's own factor leaves even where no block of it does (determinants have no direction).
+  graph_.Marginalize(leaving, {oldest->second.factor});
   pairs_.erase(oldest);
 }
 
-void PairGraph::ForgetOldRates() {
-  if (groups_.empty()) return;
-  const int64_t keep = groups_.begin()->second.first_sample;
-  while (first_sample_ < keep && samples_.size() > 1) {
+void PairGraph::ForgetOldRates(double before_s) {
+  while (samples_.size() > 1 && samples_.front().time_s < before_s &&
+         (groups_.empty() || first_sample_ < groups_.begin()->second.first_sample)) {
     samples_.pop_front();
     ++first_sample_;
   }

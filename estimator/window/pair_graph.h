@@ -73,8 +73,8 @@ class PairGraph {
 
   // Marginalises the oldest pair with its direction and the rates and biases that only it needs.
   void MarginalizeOldest();
-  // Drops samples that no pair to come can need: those before the oldest pair's.
-  void ForgetOldRates();
+  // Drops the samples before a time on the gyro clock that no pair in the graph needs.
+  void ForgetOldRates(double before_s);
 
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
   std::vector<int64_t> pair_ids() const;

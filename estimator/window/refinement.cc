@@ -28,7 +28,6 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
   double scale = rotations ? options.sigma_rad : graph_options.sigma_px;
   const auto set_scale = [&](double relative) {
     scale *= std::max(1e-3, relative);
-    if (getenv("FLOOR")) scale = std::max(scale, atof(getenv("FLOOR")));
     for (const int64_t id : ids) graph->SetSigma(id, scale);
   };
   double built_at_delay_s = 0.0, last_cost = 0.0;

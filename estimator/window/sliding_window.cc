@@ -40,6 +40,10 @@ AddResult SlidingWindow::AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns,
   pending_.push_back(
       {stamp_b_ns, time_a_s, SecondsSince(origin_ns_, stamp_b_ns), std::move(matches)});
   ProcessPending();
+  if (pending_.size() > kMaxPending) {  // the gyro is silent
+    pending_.pop_front();
+    ++num_skipped_;
+  }
   return AddResult::kAccepted;
 }
 
@@ -56,14 +60,14 @@ void SlidingWindow::ProcessPending() {
     } else {
       ++num_skipped_;
     }
+    // A pair to come starts after this one; its delay may still move, but not by a second.
+    graph_.ForgetOldRates(next.time_a_s + latest_.estimate.delay_s - 1.0);
     pending_.pop_front();
   }
 }
 
 void SlidingWindow::Process(const Pending& pair) {
-  const bool solve = settled_ || num_used_ % options_.unsettled_stride == 0 ||
-                     graph_.num_pairs() >= options_.unsettled_pairs;
-  if (!solve) return;
+  if (!settled_ && num_used_ % options_.unsettled_stride != 0) return;
   if (!settled_) {
     // The estimate still moves: the directions with it.
     for (const int64_t id : graph_.pair_ids()) graph_.Residuals(id, /*search=*/true);
@@ -84,10 +88,10 @@ void SlidingWindow::Process(const Pending& pair) {
   latest_ = {pair.stamp_b_ns, estimate, noise_px_, settled_};
   if (listener_) listener_(latest_);
 
-  const int keep = settled_ ? options_.window_pairs : options_.unsettled_pairs - 1;
+  const int keep =
+      settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.unsettled_stride;
   if (graph_.num_pairs() <= keep) return;
   while (graph_.num_pairs() > keep) graph_.MarginalizeOldest();
-  graph_.ForgetOldRates();
 }
 
 void SlidingWindow::UpdateNoise() {

@@ -75,6 +75,8 @@ class SlidingWindow {
     std::vector<Match> matches;
   };
 
+  static constexpr size_t kMaxPending = 300;  // pairs that wait for the gyro; then the oldest goes
+
   void ProcessPending();
   void Process(const Pending& pair);
   void UpdateNoise();

@@ -231,14 +231,13 @@ TEST(Robustify, KeepsInliersAndIsContinuousWithItsDerivative) {
   EXPECT_EQ(Robustify(-100.0, 0.0).value, -100.0);
   EXPECT_NEAR(Robustify(2.0 + 1e-9, 2.0).value, 2.0, 1e-8);
   EXPECT_NEAR(Robustify(2.0 + 1e-9, 2.0).derivative, 1.0, 1e-8);
-  // rho(r^2) = k^2 (1 + log(r^2/k^2)): at r = -2e, k = 2: 4 * 3 = 12.
-  const RobustResidual far = Robustify(-2.0 * M_E, 2.0);
-  EXPECT_NEAR(far.value, -std::sqrt(12.0), 1e-12);
+  // rho(r^2) = k^2 (2 - k^2/r^2): at r = -4, k = 2: 4 * (2 - 1/4) = 7.
+  const RobustResidual far = Robustify(-4.0, 2.0);
+  EXPECT_NEAR(far.value, -std::sqrt(7.0), 1e-12);
   const double h = 1e-6;
-  EXPECT_NEAR(
-      far.derivative,
-      (Robustify(-2.0 * M_E + h, 2.0).value - Robustify(-2.0 * M_E - h, 2.0).value) / (2 * h),
-      1e-8);
+  EXPECT_NEAR(far.derivative,
+              (Robustify(-4.0 + h, 2.0).value - Robustify(-4.0 - h, 2.0).value) / (2 * h), 1e-8);
+  EXPECT_LT(std::abs(Robustify(1e9, 2.0).value), 2.0 * std::sqrt(2.0) + 1e-9);
 }
 
 }  // namespace

@@ -1,0 +1,109 @@
+// The main job on a simulated recording: from a poor guess to the truth.
+#include "estimator/calibrate.h"
+
+#include <gmock/gmock.h>
+
+#include "frontend/camera_rotations.h"
+#include "tests/estimator_window/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+using simulation::Scenario;
+using simulation::Simulated;
+using simulation::SimulateTracks;
+
+// Rotations from the pictures (frontend/two_view_rotation.h), as the command line makes them.
+CameraRotationsAtFocal RotationsOf(const Recording& recording) {
+  return [pairs = SpreadPairs(PairsForRotations(recording), 100), camera = recording.camera](
+             double focal_px) { return CameraRotationsOf(pairs, camera, focal_px); };
+}
+
+TEST(CalibrateRecording, FindsTheTruthFromAPoorGuess) {
+  Simulated s = SimulateTracks(ShortScenario(6.0)).value();
+  CameraGuess& guess = s.recording.camera;
+  guess.focal_px = 1.15 * s.truth.lens[kFocal];
+  guess.principal_px.reset();
+  guess.q_gyro_cam.reset();
+  guess.readout_s.reset();
+  guess.delay_s = s.truth.delay_s + 0.8;
+  std::vector<std::string> stages;
+  const Result<CalibrationReport> report = CalibrateRecording(
+      s.recording, RotationsOf(s.recording), {}, [&](const std::string& stage, double done) {
+        EXPECT_GE(done, 0.0);
+        EXPECT_LE(done, 1.0);
+        if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+      });
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_THAT(stages, ::testing::ElementsAre("start", "window", "refinement"));
+  EXPECT_TRUE(report->converged);
+  EXPECT_THAT(report->doubts, ::testing::IsEmpty());
+
+  const Calibration& c = report->calibration;
+  const StateVector error = ErrorInSigmas(c, s.truth);
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 4.5) << error.transpose();
+  const StateVector sigma = c.sigma();
+  EXPECT_LT(sigma[kStateFocal], 4.0);
+  EXPECT_LT(sigma[kStateDelay], 1e-3);
+  EXPECT_LT(sigma[kStateReadout], 1e-3);
+  for (int i = 0; i < kStateSize; ++i) {
+    EXPECT_TRUE(c.determined[static_cast<size_t>(i)]) << StateNames()[static_cast<size_t>(i)];
+  }
+  ASSERT_TRUE(report->online.has_value());
+  const StateVector online = ErrorInSigmas(*report->online, s.truth);
+  EXPECT_LT(online.cwiseAbs().maxCoeff(), 5.0) << online.transpose();
+  EXPECT_NEAR(report->quality.noise_px, 0.7, 0.1);
+  ASSERT_TRUE(report->unseen.has_value());
+  EXPECT_LT(report->unseen->rms_px, 1.3 * report->quality.rms_px);
+  EXPECT_GT(report->unseen->pairs, 20);
+  EXPECT_FALSE(report->trace.empty());
+}
+
+TEST(CalibrateRecording, RefusesARecordingThatDoesNotTurn) {
+  Scenario scenario = ShortScenario(3.0);
+  scenario.motion.rotation_rms_rad_s.setZero();
+  const Simulated s = SimulateTracks(scenario).value();
+  const Result<CalibrationReport> report =
+      CalibrateRecording(s.recording, RotationsOf(s.recording), {});
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().kind, ErrorKind::kCannotEstimate);
+  EXPECT_FALSE(report.error().message.empty());
+}
+
+TEST(MakePrior, FollowsWhatTheFilesDeclare) {
+  Simulated s = SimulateTracks(ShortScenario(0.5)).value();
+  StartResult start;
+  start.delay_middle_row_s = 0.031;
+  start.rotation_sigma_rad = Eigen::Vector3d(0.01, 0.4, 0.01);
+  CameraGuess& guess = s.recording.camera;
+  guess.focal_px = 600.0;
+  guess.principal_px = Eigen::Vector2d(350.0, 250.0);
+  guess.readout_s = 0.022;
+  const Calibration declared = MakePrior(s.recording, start);
+  EXPECT_EQ(declared.lens[kFocal], 600.0);
+  EXPECT_EQ(declared.lens[kCx], 350.0);
+  EXPECT_EQ(declared.readout_s, 0.022);
+  EXPECT_DOUBLE_EQ(declared.delay_s, 0.031 - 0.011);  // of the first row
+  EXPECT_DOUBLE_EQ(declared.prior_sigma[kStateFocal], 90.0);
+  EXPECT_DOUBLE_EQ(declared.prior_sigma[kStateReadout], 5e-3);
+  EXPECT_EQ(declared.prior_sigma[kStateRotation], 0.15);
+  EXPECT_EQ(declared.prior_sigma[kStateRotation + 1], 0.4);
+
+  guess = CameraGuess();
+  guess.width_px = 720;
+  guess.height_px = 480;
+  start.focal.emplace();
+  start.focal->value_px = 655.0;
+  start.focal->determined = true;
+  const Calibration found = MakePrior(s.recording, start);
+  EXPECT_EQ(found.lens[kFocal], 655.0);
+  EXPECT_EQ(found.lens[kCx], 359.5);
+  EXPECT_EQ(found.lens[kCy], 239.5);
+  EXPECT_DOUBLE_EQ(found.prior_sigma[kStateFocal], 0.3 * 655.0);
+  EXPECT_NEAR(found.prior_sigma[kStateCx], 0.02 * 865.3, 0.01);
+  EXPECT_NEAR(found.readout_s, 1.0 / 60, 1e-6);
+  EXPECT_NEAR(found.delay_s, 0.031 - 1.0 / 120, 1e-6);
+}
+
+}  // namespace
+}  // namespace camgyro

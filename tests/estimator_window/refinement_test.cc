@@ -1,0 +1,158 @@
+// All pairs in one problem: truth, outliers, refusals, and what frames set aside say.
+#include "estimator/window/refinement.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.h"
+#include "tests/estimator_window/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+using simulation::Scenario;
+using simulation::Simulated;
+using simulation::SimulateTracks;
+using ::testing::HasSubstr;
+
+Result<Refined> RefineFromOffTheTruth(const Simulated& s, const EstimationInput& input) {
+  const Calibration start = StartOffTheTruth(s.truth);
+  return Refine(input, input.pairs, start, start, {});
+}
+
+// A scenario of which this share of the matches is wrong: both observations must be right.
+Simulated WithWrongMatches(double duration_s, double share) {
+  Scenario scenario = ShortScenario(duration_s);
+  scenario.tracks.outlier_fraction = 1.0 - std::sqrt(1.0 - share);
+  return SimulateTracks(scenario).value();
+}
+
+TEST(Refinement, RecoversTheTruth) {
+  for (const double wrong : {0.0, 0.02}) {
+    SCOPED_TRACE(wrong);
+    const Simulated s = WithWrongMatches(4.0, wrong);
+    const EstimationInput input = MakeEstimationInput(s.recording);
+    const Result<Refined> refined = RefineFromOffTheTruth(s, input);
+    ASSERT_TRUE(refined.has_value()) << refined.error().message;
+    EXPECT_TRUE(refined->converged);
+    EXPECT_EQ(refined->skipped_pairs, 0);
+    EXPECT_EQ(refined->quality.pairs, 120);
+    EXPECT_NEAR(refined->quality.noise_px, 0.7, 0.05);
+    EXPECT_GT(refined->quality.inlier_ratio, 0.96);
+    const StateVector error = ErrorInSigmas(refined->calibration, s.truth);
+    EXPECT_LT(error.cwiseAbs().maxCoeff(), 4.0) << error.transpose();
+    const StateVector sigma = refined->calibration.sigma();
+    EXPECT_LT(sigma[kStateFocal], 5.0);
+    EXPECT_LT(sigma[kStateDelay], 1e-3);
+    EXPECT_LT(sigma[kStateReadout], 1e-3);
+  }
+}
+
+// What the frontend did not reject is bent by the loss, not removed. The calibration stays close,
+// but its sigmas do not cover what wrong matches do: with 15 % of them b_g errs by 18 sigma.
+TEST(Refinement, StaysCloseWithManyWrongMatches) {
+  const Simulated s = WithWrongMatches(4.0, 0.15);
+  const EstimationInput input = MakeEstimationInput(s.recording);
+  const Result<Refined> refined = RefineFromOffTheTruth(s, input);
+  ASSERT_TRUE(refined.has_value()) << refined.error().message;
+  EXPECT_NEAR(refined->quality.inlier_ratio, 0.88, 0.04);
+  EXPECT_LT(refined->quality.noise_px, 1.1);
+  const StateVector error = Difference(refined->calibration, s.truth);
+  EXPECT_LT(std::abs(error[kStateFocal]), 0.03 * s.truth.lens[kFocal]);
+  EXPECT_LT(std::abs(error[kStateDelay]), 3e-3);
+  EXPECT_LT(error.segment<3>(kStateBias).norm(), 0.05);
+  RecordProperty("error_in_sigmas",
+                 ::testing::PrintToString(ErrorInSigmas(refined->calibration, s.truth)));
+}
+
+TEST(Refinement, FewerThanTenPairsAreRefused) {
+  const Simulated s = SimulateTracks(ShortScenario(0.5)).value();
+  EstimationInput input = MakeEstimationInput(s.recording);
+  ASSERT_EQ(input.pairs.size(), 15u);
+  const Calibration start = StartOffTheTruth(s.truth);
+  const std::vector<TimedPair> nine(input.pairs.begin(), input.pairs.begin() + 9);
+  const Result<Refined> few = Refine(input, nine, start, start, {});
+  ASSERT_FALSE(few.has_value());
+  EXPECT_EQ(few.error().kind, ErrorKind::kCannotEstimate);
+  EXPECT_THAT(few.error().message, HasSubstr("only 9 pairs"));
+  // Fifteen pairs, of which six have too few matches.
+  for (size_t i = 0; i < 6; ++i) input.pairs[2 * i].matches.resize(7);
+  const Result<Refined> poor = Refine(input, input.pairs, start, start, {});
+  ASSERT_FALSE(poor.has_value());
+  EXPECT_EQ(poor.error().kind, ErrorKind::kCannotEstimate);
+  // None at all.
+  const Result<Refined> none = Refine(input, {}, start, start, {});
+  ASSERT_FALSE(none.has_value());
+  EXPECT_EQ(none.error().kind, ErrorKind::kCannotEstimate);
+}
+
+TEST(EvaluateUnseen, IsTheNoiseAtTheTruthAndMoreElsewhere) {
+  const Simulated s = SimulateTracks(ShortScenario(4.0)).value();
+  const EstimationInput input = MakeEstimationInput(s.recording);
+  const UnseenFit at_truth = EvaluateUnseen(input, input.pairs, s.truth, 0.7, {});
+  EXPECT_EQ(at_truth.pairs, 120);
+  EXPECT_GT(at_truth.matches, 120 * 15);
+  // The direction comes from the other half of the matches, so that its error adds some.
+  EXPECT_GT(at_truth.rms_px, 0.65);
+  EXPECT_LT(at_truth.rms_px, 0.90);
+  Calibration wrong = s.truth;
+  wrong.lens[kFocal] *= 1.1;
+  EXPECT_GT(EvaluateUnseen(input, input.pairs, wrong, 0.7, {}).rms_px, 1.1 * at_truth.rms_px);
+  wrong = s.truth;
+  wrong.delay_s += 0.02;
+  EXPECT_GT(EvaluateUnseen(input, input.pairs, wrong, 0.7, {}).rms_px, 1.2 * at_truth.rms_px);
+  // Pairs outside of the gyro's time are not counted.
+  EstimationInput late = input;
+  late.rates.erase(late.rates.begin(), late.rates.begin() + 500);  // 2.5 s, of which 0.5 before
+  EXPECT_NEAR(EvaluateUnseen(late, input.pairs, s.truth, 0.7, {}).pairs, 60, 2);
+}
+
+TEST(EstimationInput, HoldsPairsAndRatesOnOneTimeAxis) {
+  const Simulated s = SimulateTracks(ShortScenario(1.0)).value();
+  const EstimationInput input = MakeEstimationInput(s.recording);
+  EXPECT_EQ(input.origin_ns, s.recording.gyro.front().stamp_ns);
+  ASSERT_EQ(input.rates.size(), s.recording.gyro.size());
+  EXPECT_EQ(input.rates.front().time_s, 0.0);
+  EXPECT_EQ(input.rates[7].omega_gyro_rad_s, s.recording.gyro[7].omega_gyro_rad_s);
+  ASSERT_EQ(input.pairs.size(), 30u);
+  const TimedPair& pair = input.pairs[11];
+  EXPECT_EQ(pair.id, 11);
+  EXPECT_EQ(pair.frame_a, 11);
+  EXPECT_EQ(pair.frame_b, 12);
+  EXPECT_EQ(pair.time_b_s, SecondsSince(input.origin_ns, s.recording.frames[12].stamp_ns));
+  EXPECT_EQ(pair.matches.size(), PairsFromTracks(s.recording.tracks, 1)[11].matches.size());
+
+  // Attitudes are paired a few frames apart; matches win over both.
+  Recording attitudes = s.recording;
+  attitudes.tracks.clear();
+  for (size_t i = 0; i < attitudes.frames.size(); ++i) {
+    attitudes.q_cam_world.push_back(Exp(Eigen::Vector3d(0.0, 0.01 * static_cast<double>(i), 0.0)));
+  }
+  const EstimationInput rotations = MakeEstimationInput(attitudes, 4);
+  ASSERT_EQ(rotations.pairs.size(), 7u);  // 31 frames: 0-4, ..., 24-28
+  EXPECT_EQ(rotations.pairs[2].frame_a, 8);
+  EXPECT_EQ(rotations.pairs[2].frame_b, 12);
+  EXPECT_TRUE(rotations.pairs[2].matches.empty());
+  // World -> camera turns by +0.04: vectors of camera b into camera a turn back.
+  EXPECT_LT((Log(rotations.pairs[2].rotation.q_a_b) - Eigen::Vector3d(0.0, -0.04, 0.0)).norm(),
+            1e-12);
+}
+
+TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
+  Scenario scenario = ShortScenario(4.0);
+  Simulated s = SimulateTracks(scenario).value();
+  s.recording.gyro_info.noise_density_rad_s_rtHz.reset();
+  // 2.1e-4 rad/s/rtHz at 200 Hz.
+  const double expected = 2.1e-4 * std::sqrt(200.0);
+  const Eigen::Vector3d shown = GyroSigma(s.recording, s.truth.delay_s);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(shown[k], expected, 0.15 * expected);
+  s.recording.gyro_info.noise_density_rad_s_rtHz = 5e-4;
+  EXPECT_LT(
+      (GyroSigma(s.recording, 0.0) - Eigen::Vector3d::Constant(5e-4 * std::sqrt(200.0))).norm(),
+      1e-6);
+}
+
+}  // namespace
+}  // namespace camgyro
