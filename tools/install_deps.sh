@@ -12,6 +12,8 @@ packages=(
   libyaml-cpp-dev libexpected-dev libfast-float-dev
   # tests
   libgmock-dev libgtest-dev
+  # tools/measure.py
+  python3
 )
 
 missing=()
