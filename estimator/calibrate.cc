@@ -192,7 +192,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                 : StartFromPictures(recording, rotations_at, options);
   if (!start) return tl::unexpected(start.error());
   report.start = *start;
-  report.notes = start->notes;
+  for (const std::string& note : start->notes) report.notes.push_back("at the start: " + note);
   clock.Finish("start");
 
   const Calibration prior = MakePrior(recording, *start);

@@ -2,6 +2,7 @@
 #include "estimator/window/sliding_window.h"
 
 #include <gmock/gmock.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <limits>
@@ -104,6 +105,36 @@ TEST(SlidingWindow, TwoRunsAreBitIdenticalAndMemoryIsBounded) {
     ExpectIdentical(first[i], second[i]);
     if (HasFailure()) break;
   }
+}
+
+// Ten times the recording, end to end, needs no more heap than twice: the window forgets. (The
+// first pass fills the longest window, before the estimate has settled.)
+TEST(SlidingWindowMemory, DoesNotGrowWithTheLengthOfTheRecording) {
+  const Simulated s = SimulateTracks(ShortScenario(6.0)).value();
+  const int64_t period_ns =
+      s.recording.gyro.back().stamp_ns - s.recording.gyro.front().stamp_ns + 5'000'000;
+  SlidingWindow window = MakeWindow(s);
+  const std::vector<FramePair> pairs = PairsFromTracks(s.recording.tracks, 1);
+  std::vector<size_t> heap_bytes;
+  for (int pass = 0; pass < 10; ++pass) {
+    const int64_t shift = pass * period_ns;
+    size_t next = 0;
+    for (const FramePair& pair : pairs) {
+      const int64_t a = s.recording.frames[static_cast<size_t>(pair.frame_a)].stamp_ns;
+      const int64_t b = s.recording.frames[static_cast<size_t>(pair.frame_b)].stamp_ns;
+      for (; next < s.recording.gyro.size() && s.recording.gyro[next].stamp_ns <= b; ++next) {
+        GyroSample sample = s.recording.gyro[next];
+        sample.stamp_ns += shift;
+        ASSERT_EQ(window.AddGyroSample(sample), AddResult::kAccepted);
+      }
+      ASSERT_EQ(window.AddPair(a + shift, b + shift, pair.matches), AddResult::kAccepted);
+    }
+    heap_bytes.push_back(mallinfo2().uordblks);
+  }
+  EXPECT_GT(window.num_used_pairs(), 1700);
+  // 100 kB: a window of 10 pairs that happens to hold more matches or rates at that moment. The
+  // samples alone of the eight passes between would be 400 kB.
+  EXPECT_LT(heap_bytes.back(), heap_bytes[1] + 100'000);
 }
 
 TEST(SlidingWindow, RefusesBadDataWhichThenChangeNothing) {
