@@ -19,7 +19,7 @@ struct SlidingWindowOptions {
   int window_pairs = 10;  // kept once the estimate has settled
 
   // Until then nothing is marginalised, up to this many pairs: a prior that was linearised at a
-  // poor estimate stays wrong for ever (docs/window.md has the numbers). The window is then solved
+  // poor estimate stays wrong for ever. The window is then solved
   // every `unsettled_stride` pairs.
   int unsettled_pairs = 150;
   int unsettled_stride = 10;
