@@ -79,10 +79,10 @@ class Effect {
 // What an effect may know of the recording that it is made for.
 struct EffectSetup {
   Eigen::Vector2d size_px = Eigen::Vector2d::Zero();
-  std::vector<FrameTime> frames;     // at least two
-  std::vector<double> gyro_times_s;  // after the first gyro stamp
-  Eigen::Matrix3Xd gyro_rad_s;       // readings, one column per time
-  double delay_s = 0.0;              // t_d as far as it is known
+  std::vector<FrameTime> frames;          // at least two
+  std::vector<double> gyro_times_s;       // after the first gyro stamp
+  Eigen::Matrix3Xd gyro_rad_s;            // readings, one column per time
+  double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
   Eigen::Matrix3d R_gyro_cam = Eigen::Matrix3d::Identity();
   bool has_pixels = true;  // false: attitudes
 

@@ -16,7 +16,8 @@ class OpticalStabilisation final : public Effect {
   OpticalStabilisation(const EffectSetup& setup, double corner_hz)
       : Effect({{"shift_per_rad", "px/rad", 500.0, 0.0, 1e4}}),
         times_s_(setup.gyro_times_s),
-        delay_s_(setup.delay_s) {
+        delay_s_(setup.delay_s),
+        readout_s_(setup.readout_s) {
     const double a = 2.0 * M_PI * corner_hz;
     const auto n = static_cast<Eigen::Index>(times_s_.size());
     const Eigen::Vector3d mean = setup.gyro_rad_s.rowwise().mean();  // the bias, nearly
@@ -31,7 +32,7 @@ class OpticalStabilisation final : public Effect {
     }
   }
   void ChangeLens(const Observation& o, LensColumns columns) const override {
-    const double t = o.frame.stamp_s + delay_s_;
+    const double t = o.frame.stamp_s + delay_s_ + readout_s_ * o.px.y() / o.size_px.y();
     const auto next = std::lower_bound(times_s_.begin(), times_s_.end(), t);
     if (next == times_s_.begin() || next == times_s_.end()) return;
     const Eigen::Index i = next - times_s_.begin();
@@ -43,7 +44,7 @@ class OpticalStabilisation final : public Effect {
 
  private:
   const std::vector<double> times_s_;
-  const double delay_s_;
+  const double delay_s_, readout_s_;
   Eigen::Matrix2Xd angle_;
 };
 

@@ -51,6 +51,7 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   EffectSetup setup;
   setup.size_px << recording.camera.width_px, recording.camera.height_px;
   setup.delay_s = calibration.delay_s;
+  setup.readout_s = calibration.readout_s;
   setup.R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
   setup.has_pixels = !recording.matches.empty() || !recording.tracks.empty();
   const int64_t origin_ns = recording.gyro.front().stamp_ns;
