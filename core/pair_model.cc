@@ -61,6 +61,13 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
     b->J_time_px += change.tail<2>().transpose();
   }
   if (!lens_model.Unproject(px, lens_here, &b->lens_ray, derivatives)) return false;
+  if (b->change.lens_slope[0].cols() > 0 && derivatives) {
+    const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
+    for (int k = 0; k < 2; ++k) {
+      b->lens_ray.J_ray_px.col(k) +=
+          b->lens_ray.J_ray_lens * (b->change.lens_slope[static_cast<size_t>(k)] * values);
+    }
+  }
   b->rotation = chain.At(time_s);
   b->R_ref_cam = b->rotation.R_ref_gyro * R_gyro_cam;
   b->omega_cam_rad_s = R_gyro_cam.transpose() * b->rotation.omega_gyro_rad_s;
@@ -114,6 +121,10 @@ void Backpropagate(const Bearing& b, const RotationChain& chain, double height_p
     if (gradient->by_effects.size() == 0) gradient->by_effects.setZero(b.change.lens.cols());
     gradient->by_effects += by_lens * b.change.lens +
                             Eigen::RowVector3d(by_time, by_slope.x(), by_slope.y()) * b.change.time;
+    for (int k = 0; k < 2 && b.change.lens_slope[0].cols() > 0; ++k) {
+      gradient->by_effects += (by_J_cam.col(k).transpose() * b.lens_ray.J_ray_lens) *
+                              b.change.lens_slope[static_cast<size_t>(k)];
+    }
   }
 
   chain.AddRateGradient(b.rotation, by_phi, by_omega, by_rates);

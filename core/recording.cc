@@ -44,4 +44,30 @@ std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoin
 double MedianInterval(const std::vector<GyroSample>& gyro) { return MedianIntervalOf(gyro); }
 double MedianInterval(const std::vector<Frame>& frames) { return MedianIntervalOf(frames); }
 
+std::vector<bool> FindSaturated(const std::vector<GyroSample>& gyro) {
+  std::vector<bool> saturated(gyro.size(), false);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double sign : {1.0, -1.0}) {
+      double rail = 0.0;
+      for (const GyroSample& sample : gyro) {
+        rail = std::max(rail, sign * sample.omega_gyro_rad_s[axis]);
+      }
+      int at = 0, below = 0;
+      for (const GyroSample& sample : gyro) {
+        const double share = sign * sample.omega_gyro_rad_s[axis] / rail;
+        if (share > 1.0 - 1e-6) {
+          ++at;
+        } else if (share > 0.97) {
+          ++below;
+        }
+      }
+      if (!(rail > 0.5) || at < 5 || at < 2 * below) continue;
+      for (size_t i = 0; i < gyro.size(); ++i) {
+        if (sign * gyro[i].omega_gyro_rad_s[axis] > (1.0 - 1e-6) * rail) saturated[i] = true;
+      }
+    }
+  }
+  return saturated;
+}
+
 }  // namespace camgyro

@@ -81,6 +81,7 @@ struct CameraGuess {
 struct GyroInfo {
   std::optional<double> noise_density_rad_s_rtHz;  // white noise, continuous
   std::optional<double> random_walk_rad_s2_rtHz;   // of the bias
+  std::optional<double> declared_rate_hz;          // as the file says, not as the stamps have it
 };
 
 struct Recording {
@@ -112,6 +113,10 @@ struct Recording {
 // Matches between frames i and i + gap from tracks: every track seen in both.
 std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,
                                        int gap);
+
+// Which samples stay at the gyro's full scale: the largest magnitude of an axis, if it is taken far
+// more often than values just below it.
+std::vector<bool> FindSaturated(const std::vector<GyroSample>& gyro);
 
 // Median interval of strictly increasing stamps [s]; 0 with fewer than two.
 double MedianInterval(const std::vector<GyroSample>& gyro);

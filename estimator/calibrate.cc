@@ -174,6 +174,19 @@ Calibration MakePrior(const Recording& recording, const StartResult& start) {
   return prior;
 }
 
+PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
+                                 const CalibrateOptions& options) {
+  PairGraphOptions graph_options = options.window.graph;
+  graph_options.residual = options.residual;
+  graph_options.match_noise = recording.match_noise;
+  graph_options.gyro_sigma_rad_s = GyroSigma(recording, start.delay_middle_row_s);
+  if (recording.gyro_info.random_walk_rad_s2_rtHz) {
+    graph_options.bias_walk_rad_s2_rtHz =
+        std::max(1e-6, *recording.gyro_info.random_walk_rad_s2_rtHz);
+  }
+  return graph_options;
+}
+
 Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                                              const CameraRotationsAtFocal& rotations_at,
                                              const CalibrateOptions& options,
@@ -188,8 +201,9 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
 
   tell("start", 0.0);
   const Result<StartResult> start =
-      attitudes ? FindStart(recording, NeighbourRotations(recording), options.start)
-                : StartFromPictures(recording, rotations_at, options);
+      options.given_start ? Result<StartResult>(*options.given_start)
+      : attitudes         ? FindStart(recording, NeighbourRotations(recording), options.start)
+                          : StartFromPictures(recording, rotations_at, options);
   if (!start) return tl::unexpected(start.error());
   report.start = *start;
   for (const std::string& note : start->notes) report.notes.push_back("at the start: " + note);
@@ -199,20 +213,16 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   Calibration estimate = prior;
   estimate.bias_gyro_rad_s = start->bias_gyro_rad_s;
   if (start->focal && start->focal->determined) estimate.lens[kFocal] = start->focal->value_px;
-  if (!options.effects.empty()) {
+  if (options.from) {
+    estimate = *options.from;
+    estimate.prior_sigma = prior.prior_sigma;
+  } else if (!options.effects.empty()) {
     Result<EffectSet> effects = MakeEffects(options.effects, MakeEffectSetup(recording, prior));
     if (!effects) return tl::unexpected(effects.error());
     estimate.effect_values = Eigen::VectorXd::Zero(effects->size());
     estimate.effects = std::make_shared<const EffectSet>(std::move(*effects));
   }
-  PairGraphOptions graph_options = options.window.graph;
-  graph_options.residual = options.residual;
-  graph_options.match_noise = recording.match_noise;
-  graph_options.gyro_sigma_rad_s = GyroSigma(recording, start->delay_middle_row_s);
-  if (recording.gyro_info.random_walk_rad_s2_rtHz) {
-    graph_options.bias_walk_rad_s2_rtHz =
-        std::max(1e-6, *recording.gyro_info.random_walk_rad_s2_rtHz);
-  }
+  const PairGraphOptions graph_options = GraphOptionsFor(recording, *start, options);
 
   if (!attitudes) {
     SlidingWindowOptions window_options = options.window;
@@ -226,7 +236,8 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
       for (; next_sample < input.rates.size() &&
              input.rates[next_sample].time_s <= pair.time_b_s + estimate.delay_s;
            ++next_sample) {
-        if (window.AddGyroSample(recording.gyro[next_sample]) != AddResult::kAccepted) {
+        if (window.AddGyroSample(recording.gyro[next_sample], input.rates[next_sample].saturated) !=
+            AddResult::kAccepted) {
           return BadInput("gyro sample " + std::to_string(next_sample) +
                           ": the stamp repeats or goes back, or a rate is not finite");
         }
@@ -241,7 +252,8 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
       if (i % 20 == 0) tell("window", static_cast<double>(i) / input.pairs.size());
     }
     for (; next_sample < input.rates.size(); ++next_sample) {
-      if (window.AddGyroSample(recording.gyro[next_sample]) != AddResult::kAccepted) {
+      if (window.AddGyroSample(recording.gyro[next_sample], input.rates[next_sample].saturated) !=
+          AddResult::kAccepted) {
         return BadInput("gyro sample " + std::to_string(next_sample) +
                         ": the stamp repeats or goes back, or a rate is not finite");
       }

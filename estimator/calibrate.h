@@ -25,6 +25,10 @@ struct CalibrateOptions {
   bool refine = true;   // false: the online estimate is the result
   std::string effects;  // of the catalogue, to fit as well; see MakeEffects
   StartOptions start;
+  // What was found before (diagnosis): a start that is not searched again, and values with effects
+  // to begin from.
+  std::optional<StartResult> given_start;
+  std::optional<Calibration> from;
   FocalScanOptions focal_scan;
   SlidingWindowOptions window;
   RefinementOptions refinement;
@@ -74,6 +78,10 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
 //   of that interval; t_d: +- 50 ms around the search's; b_g: 0 +- 0.1 rad/s; q_c: +- 0.15 rad
 //   around the search's. Attitudes: t_r 0, and units for what needs pixels.
 Calibration MakePrior(const Recording& recording, const StartResult& start);
+
+// Noise and loss as CalibrateRecording uses them for this recording.
+PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
+                                 const CalibrateOptions& options);
 
 }  // namespace camgyro
 

@@ -38,6 +38,7 @@ const EffectEntry* FindEffect(const std::string& name) {
 void EffectSet::Add(const EffectEntry* entry, std::string shape,
                     std::shared_ptr<const Effect> effect) {
   const int columns = effect->size();
+  has_lens_slope_ = has_lens_slope_ || effect->has_lens_slope();
   items_.push_back({entry, std::move(shape), std::move(effect), size_});
   size_ += columns;
 }
@@ -63,6 +64,13 @@ void EffectSet::ChangeObservation(const Observation& observation, Change* change
     const int n = item.effect->size();
     item.effect->ChangeLens(observation, change->lens.middleCols(item.first, n));
     item.effect->ChangeTime(observation, change->time.middleCols(item.first, n));
+  }
+  if (!has_lens_slope_) return;
+  for (auto& slope : change->lens_slope) slope.setZero(kLensSize, size_);
+  for (const Item& item : items_) {
+    const int n = item.effect->size();
+    item.effect->ChangeLensSlope(observation, change->lens_slope[0].middleCols(item.first, n),
+                                 change->lens_slope[1].middleCols(item.first, n));
   }
 }
 

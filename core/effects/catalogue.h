@@ -2,6 +2,8 @@
 #ifndef CAMGYRO_CORE_EFFECTS_CATALOGUE_H_
 #define CAMGYRO_CORE_EFFECTS_CATALOGUE_H_
 
+#include <array>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,6 +32,7 @@ class EffectSet {
   // What all effects change at one observation; columns as the parameters of the set.
   struct Change {
     Eigen::Matrix<double, kLensSize, Eigen::Dynamic> lens;
+    std::array<Eigen::Matrix<double, kLensSize, Eigen::Dynamic>, 2> lens_slope;  // or empty
     Eigen::Matrix<double, 3, Eigen::Dynamic> time;
   };
 
@@ -53,6 +56,7 @@ class EffectSet {
  private:
   std::vector<Item> items_;
   int size_ = 0;
+  bool has_lens_slope_ = false;
 };
 
 // Effects of the catalogue at their present size. Both null: none.

@@ -17,12 +17,12 @@ class DelayWander final : public Effect {
   DelayWander(const EffectSetup& setup, const TimeCurve& curve)
       : Effect(Parameters(curve)), curve_(curve), delay_s_(setup.delay_s) {}
   static TimeCurve Curve(const EffectSetup& setup) {
-    return TimeCurve(setup.from_s(), setup.to_s(), 1.7, 30);
+    return TimeCurve(setup.from_s(), setup.to_s(), 1.7, 24);
   }
   static std::vector<EffectParameter> Parameters(const TimeCurve& curve) {
     std::vector<EffectParameter> parameters;
     for (int i = 0; i < curve.size(); ++i) {
-      parameters.push_back({"delay_" + std::to_string(i + 1), "s", 0.02, -0.2, 0.2});
+      parameters.push_back({"delay_" + std::to_string(i + 1), "s", 8e-3, -0.2, 0.2});
     }
     return parameters;
   }

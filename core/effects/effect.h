@@ -59,6 +59,11 @@ class Effect {
   int size() const { return static_cast<int>(parameters_.size()); }
 
   virtual void ChangeLens(const Observation& /*observation*/, LensColumns /*columns*/) const {}
+  // Derivatives of ChangeLens by the pixel's u and v, where it depends on the pixel: noise of the
+  // pixel goes through them.
+  virtual void ChangeLensSlope(const Observation& /*observation*/, LensColumns /*by_u*/,
+                               LensColumns /*by_v*/) const {}
+  virtual bool has_lens_slope() const { return false; }
   virtual void ChangeTime(const Observation& /*observation*/, TimeColumns /*columns*/) const {}
   // omega: true rate at that time, gyro frame [rad/s].
   virtual void ChangeRate(double /*time_gyro_s*/, const Eigen::Vector3d& /*omega_gyro_rad_s*/,
@@ -69,6 +74,8 @@ class Effect {
   }
   // The change of the lens is the same for every pixel and all the time: a part of the lens block.
   virtual bool is_constant_lens() const { return false; }
+  // Made from a calibration so exactly that it is to be made anew when that has moved.
+  virtual bool depends_on_calibration() const { return false; }
   // Prior of the translation direction's turn that this effect needs [rad]; 0: as it is.
   virtual double turn_sigma_rad() const { return 0.0; }
 

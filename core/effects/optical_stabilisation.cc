@@ -41,6 +41,7 @@ class OpticalStabilisation final : public Effect {
     columns(kCx, 0) = angle.y();
     columns(kCy, 0) = -angle.x();
   }
+  bool depends_on_calibration() const override { return true; }
 
  private:
   const std::vector<double> times_s_;

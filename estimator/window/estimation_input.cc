@@ -12,9 +12,10 @@ namespace camgyro {
 EstimationInput MakeEstimationInput(const Recording& recording) {
   EstimationInput input;
   input.origin_ns = recording.gyro.front().stamp_ns;
+  const std::vector<bool> saturated = FindSaturated(recording.gyro);
   for (const GyroSample& sample : recording.gyro) {
-    input.rates.push_back(
-        {SecondsSince(input.origin_ns, sample.stamp_ns), sample.omega_gyro_rad_s});
+    input.rates.push_back({SecondsSince(input.origin_ns, sample.stamp_ns), sample.omega_gyro_rad_s,
+                           saturated[input.rates.size()]});
   }
   const auto add = [&](int a, int b) -> TimedPair& {
     TimedPair pair;

@@ -154,6 +154,7 @@ AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, std::vector<
       (std::lower_bound(samples_.begin(), samples_.end(), to_s, by_time) - samples_.begin());
   for (int64_t i = first; i < last; ++i) {
     const double gap = sample(i + 1).time_s - sample(i).time_s;
+    if (sample(i).saturated || sample(i + 1).saturated) return AddPairResult::kGyroGap;
     if (gap > std::max(kGapFloorS, kGapIntervals * median_interval_s_)) {
       return AddPairResult::kGyroGap;
     }

@@ -41,13 +41,14 @@ struct PairGraphOptions {
 struct TimedRate {
   double time_s = 0.0;
   Eigen::Vector3d omega_gyro_rad_s = Eigen::Vector3d::Zero();
+  bool saturated = false;  // at the gyro's full scale: no pair may need it
 };
 
 enum class AddPairResult {
   kAdded,
   kGyroTooLate,    // the samples do not reach to the end of the pair yet
   kGyroTooEarly,   // samples at the start of the pair are missing or were dropped
-  kGyroGap,        // a hole in the gyro samples inside the pair
+  kGyroGap,        // a hole in the gyro samples inside the pair, or a saturated sample
   kTooFewMatches,  // fewer than PairGraph::kMinMatches with a ray
 };
 

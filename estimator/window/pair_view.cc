@@ -21,6 +21,7 @@ bool RatesOfPair(const EstimationInput& input, const TimedPair& pair,
   times_s->clear();
   rates->resize(3, last - first);
   for (auto it = first; it != last; ++it) {
+    if (it->saturated) return false;
     if (it != first && it->time_s - std::prev(it)->time_s > longest) return false;
     times_s->push_back(it->time_s);
     rates->col(it - first) = TrueRate(calibration.pair_effects(), it->time_s,

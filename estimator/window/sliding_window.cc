@@ -19,12 +19,12 @@ SlidingWindow::SlidingWindow(const Calibration& start, const Calibration& prior_
   latest_.noise_px = noise_px_;
 }
 
-AddResult SlidingWindow::AddGyroSample(const GyroSample& sample) {
+AddResult SlidingWindow::AddGyroSample(const GyroSample& sample, bool saturated) {
   if (!sample.omega_gyro_rad_s.allFinite()) return AddResult::kNotFinite;
   const double time_s = SecondsSince(origin_ns_, sample.stamp_ns);
   if (!(time_s > last_gyro_time_s_)) return AddResult::kNotIncreasing;
   last_gyro_time_s_ = time_s;
-  graph_.AddRate({time_s, sample.omega_gyro_rad_s});
+  graph_.AddRate({time_s, sample.omega_gyro_rad_s, saturated});
   ProcessPending();
   return AddResult::kAccepted;
 }

@@ -52,7 +52,8 @@ class SlidingWindow {
                 const SlidingWindowOptions& options);
 
   // Bad data are refused by the result and change nothing.
-  [[nodiscard]] AddResult AddGyroSample(const GyroSample& sample);
+  // saturated: at the gyro's full scale; pairs that need such a sample are left out.
+  [[nodiscard]] AddResult AddGyroSample(const GyroSample& sample, bool saturated = false);
   // A pair waits inside until the gyro has passed it. stamp_a may not go back.
   // Exposures in seconds, NaN if they are not known: only effects need them.
   [[nodiscard]] AddResult AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns,

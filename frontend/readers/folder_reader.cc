@@ -173,6 +173,7 @@ Status ReadImu(const fs::path& imu, Recording* recording) {
   const Result<SensorYaml> yaml = ReadSensorYaml((imu / "sensor.yaml").string());
   if (!yaml) return tl::unexpected(yaml.error());
   recording->gyro_info = yaml->gyro;
+  recording->gyro_info.declared_rate_hz = yaml->rate_hz;
   if (recording->camera.q_gyro_cam && yaml->q_body_sensor) {
     recording->camera.q_gyro_cam = yaml->q_body_sensor->conjugate() * *recording->camera.q_gyro_cam;
   }

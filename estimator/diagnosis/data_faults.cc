@@ -1,0 +1,232 @@
+#include "estimator/diagnosis/data_faults.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+#include "core/effects/catalogue.h"
+#include "core/robust_statistics.h"
+#include "core/so3.h"
+#include "core/time.h"
+
+namespace camgyro {
+namespace {
+
+__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
+  char text[400];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  return text;
+}
+
+// Gaps longer than 1.5 intervals: how many, how many steps are missing, where the longest is.
+struct Gaps {
+  int count = 0, missing = 0;
+  double longest_s = 0.0, longest_at_s = 0.0;
+};
+
+template <typename Stamped>
+Gaps FindGaps(const std::vector<Stamped>& items, int64_t origin_ns) {
+  Gaps gaps;
+  const double interval = MedianInterval(items);
+  for (size_t i = 1; i < items.size(); ++i) {
+    const double step = SecondsSince(items[i - 1].stamp_ns, items[i].stamp_ns);
+    if (step < 1.5 * interval) continue;
+    ++gaps.count;
+    gaps.missing += static_cast<int>(std::lround(step / interval)) - 1;
+    if (step > gaps.longest_s) {
+      gaps.longest_s = step;
+      gaps.longest_at_s = SecondsSince(origin_ns, items[i - 1].stamp_ns);
+    }
+  }
+  return gaps;
+}
+
+double PairMotion(const FramePair& pair) {
+  std::vector<double> motion;
+  for (const Match& match : pair.matches) motion.push_back((match.px_b - match.px_a).norm());
+  return motion.empty() ? 0.0 : MedianInPlace(&motion);
+}
+
+// Neighbouring frames that show the same picture while those around them move.
+int CountDuplicates(const Recording& recording) {
+  const std::vector<FramePair> pairs =
+      recording.matches.empty() ? PairsFromTracks(recording.tracks, 1) : recording.matches;
+  std::vector<double> motion;
+  for (const FramePair& pair : pairs) motion.push_back(PairMotion(pair));
+  int duplicates = 0;
+  for (size_t i = 1; i + 1 < motion.size(); ++i) {
+    const bool around = std::min(motion[i - 1], motion[i + 1]) > 1.0;
+    if (around && pairs[i].matches.size() >= 8 &&
+        motion[i] < 0.02 * std::min(motion[i - 1], motion[i + 1])) {
+      ++duplicates;
+    }
+  }
+  return duplicates;
+}
+
+// Power of rates in a band, by differences of moving averages; rates and the times between them.
+double BandPower(const std::vector<Eigen::Vector3d>& rates, int shorter, int longer) {
+  const int n = static_cast<int>(rates.size());
+  const auto mean = [&](int at, int width) {
+    const int from = std::max(0, at - width / 2), to = std::min(n, at - width / 2 + width);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int i = from; i < to; ++i) sum += rates[static_cast<size_t>(i)];
+    return Eigen::Vector3d(sum / std::max(1, to - from));
+  };
+  std::vector<double> power;  // the median forgives wrong rotations of the camera
+  for (int i = longer / 2; i + longer / 2 < n; ++i) {
+    power.push_back((mean(i, shorter) - mean(i, longer)).squaredNorm());
+  }
+  return power.empty() ? 0.0 : MedianInPlace(&power);
+}
+
+}  // namespace
+
+std::vector<DataFault> FindDataFaults(const Recording& recording) {
+  std::vector<DataFault> faults;
+  if (recording.gyro.size() < 10 || recording.frames.size() < 3) return faults;
+  const int64_t origin_ns = recording.gyro.front().stamp_ns;
+
+  const std::vector<bool> saturated = FindSaturated(recording.gyro);
+  const auto count = std::count(saturated.begin(), saturated.end(), true);
+  if (count > 0) {
+    double rail = 0.0;
+    for (size_t i = 0; i < saturated.size(); ++i) {
+      if (saturated[i]) {
+        rail = std::max(rail, recording.gyro[i].omega_gyro_rad_s.cwiseAbs().maxCoeff());
+      }
+    }
+    faults.push_back({"gyro_saturation",
+                      Format("%ld of %zu gyro samples stay at the rail of %.3f rad/s (%.0f deg/s)",
+                             static_cast<long>(count), saturated.size(), rail, rail * 57.29578),
+                      FindEffect("gyro_saturation")->advice});
+  }
+  const Gaps frames = FindGaps(recording.frames, origin_ns);
+  if (frames.count > 0) {
+    faults.push_back(
+        {"dropped_frames",
+         Format("%d gaps in the frames' stamps (about %d frames missing), the longest "
+                "of %.0f ms at %.2f s",
+                frames.count, frames.missing, 1e3 * frames.longest_s, frames.longest_at_s),
+         "harmless if the stamps are right: check for a delay_step at these times"});
+  }
+  const Gaps samples = FindGaps(recording.gyro, origin_ns);
+  if (samples.longest_s > std::max(0.03, 5.0 * MedianInterval(recording.gyro))) {
+    faults.push_back({"dropped_samples",
+                      Format("%d gaps in the gyro's stamps, the longest of %.0f ms at %.2f s",
+                             samples.count, 1e3 * samples.longest_s, samples.longest_at_s),
+                      "pairs of frames in such gaps are left out; give the logger more time"});
+  }
+  const int duplicates = CountDuplicates(recording);
+  if (duplicates > 0) {
+    faults.push_back(
+        {"duplicated_frames",
+         Format("%d frames repeat the picture before them while the camera moves", duplicates),
+         "drop them: their stamps belong to another picture"});
+  }
+  const double interval = MedianInterval(recording.gyro);
+  if (recording.gyro_info.declared_rate_hz && interval > 0.0 &&
+      std::abs(*recording.gyro_info.declared_rate_hz * interval - 1.0) > 0.03) {
+    faults.push_back({"gyro_rate",
+                      Format("the file declares %.6g Hz, the stamps show %.6g Hz",
+                             *recording.gyro_info.declared_rate_hz, 1.0 / interval),
+                      "trust the stamps, or find out which of the two is wrong"});
+  }
+  return faults;
+}
+
+std::optional<std::string> FindElectronicStabilisation(
+    const Recording& recording, const std::vector<CameraRotation>& rotations) {
+  // Mean rates between neighbouring frames, of the camera and, whatever the delay, of the gyro.
+  std::vector<Eigen::Vector3d> camera, gyro;
+  double interval_s = 0.0;
+  for (const CameraRotation& rotation : rotations) {
+    if (rotation.frame_b != rotation.frame_a + 1) continue;
+    const double dt =
+        SecondsSince(recording.frames[static_cast<size_t>(rotation.frame_a)].stamp_ns,
+                     recording.frames[static_cast<size_t>(rotation.frame_b)].stamp_ns);
+    camera.push_back(Log(rotation.q_a_b) / dt);
+    interval_s += dt;
+  }
+  if (camera.size() < 60) return std::nullopt;
+  interval_s /= static_cast<double>(camera.size());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int in_sum = 0;
+  int64_t begin_ns = recording.gyro.front().stamp_ns;
+  for (const GyroSample& sample : recording.gyro) {
+    if (in_sum > 0 && SecondsSince(begin_ns, sample.stamp_ns) >= interval_s) {
+      gyro.push_back(sum / in_sum);
+      begin_ns = StampAt(begin_ns, interval_s);
+      sum.setZero();
+      in_sum = 0;
+    }
+    sum += sample.omega_gyro_rad_s;
+    ++in_sum;
+  }
+  const auto frames = [&](double seconds) {
+    return std::max(1, static_cast<int>(std::lround(seconds / interval_s)));
+  };
+  // Between averages over 0.1 and 0.5 s: about 1 to 5 Hz. Between 1 and 4 s: slow.
+  const double fast = BandPower(camera, frames(0.1), frames(0.5)) /
+                      std::max(1e-12, BandPower(gyro, frames(0.1), frames(0.5)));
+  const double slow = BandPower(camera, frames(1.0), frames(4.0)) /
+                      std::max(1e-12, BandPower(gyro, frames(1.0), frames(4.0)));
+  if (fast < 0.15 && fast < 0.35 * slow) {
+    return Format(
+        "of the gyro's rotation, the picture has %.0f %% below 0.5 Hz, but only %.0f %% "
+        "above 1 Hz",
+        100.0 * std::sqrt(slow), 100.0 * std::sqrt(fast));
+  }
+  return std::nullopt;
+}
+
+std::optional<DataFault> RepairGyro(const CameraRotationsAtFocal& rotations_at,
+                                    const StartOptions& options, Recording* recording) {
+  const double focal = recording->camera.focal_px.value_or(0.8 * recording->camera.width_px);
+  const std::vector<CameraRotation> rotations = rotations_at(focal);
+  struct Repair {
+    double scale;
+    bool mirror;
+    const char* name;
+    const char* finding;
+    const char* advice;
+  };
+  const std::array<Repair, 4> repairs = {
+      Repair{M_PI / 180.0, false, "gyro_unit", "the gyro's rates are in deg/s, not rad/s",
+             "convert them to rad/s in the recording"},
+      Repair{180.0 / M_PI, false, "gyro_unit",
+             "the gyro's rates were divided by 57.3 once too often",
+             "convert from deg/s to rad/s only once"},
+      Repair{1.0, true, "gyro_axes",
+             "the gyro's axes are left-handed: two axes are exchanged, or one has the wrong sign",
+             "correct the order or the signs of the gyro's columns"},
+      Repair{M_PI / 180.0, true, "gyro_unit_and_axes",
+             "the gyro's rates are in deg/s, and its axes left-handed (two exchanged, or one sign)",
+             "correct the unit and the order or the signs of the gyro's columns"}};
+  std::optional<DataFault> best;
+  Recording repaired = *recording;
+  double best_explained = 0.8;
+  for (const Repair& repair : repairs) {
+    Recording trial = *recording;
+    trial.camera.q_gyro_cam.reset();
+    for (GyroSample& sample : trial.gyro) {
+      sample.omega_gyro_rad_s *= repair.mirror ? -repair.scale : repair.scale;
+    }
+    const Result<StartResult> start = FindStart(trial, rotations, options);
+    if (start && start->explained > best_explained && start->rate_ratio > 0.5 &&
+        start->rate_ratio < 2.0) {
+      best_explained = start->explained;
+      best = DataFault{repair.name, repair.finding, repair.advice};
+      repaired = std::move(trial);
+    }
+  }
+  if (best) *recording = std::move(repaired);
+  return best;
+}
+
+}  // namespace camgyro

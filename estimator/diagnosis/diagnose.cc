@@ -1,0 +1,101 @@
+#include "estimator/diagnosis/diagnose.h"
+
+#include <algorithm>
+
+namespace camgyro {
+namespace {
+
+// Rotations between neighbouring frames, whatever the recording has.
+std::vector<CameraRotation> NeighbourRotations(const Recording& recording,
+                                               const CameraRotationsAtFocal& rotations_at) {
+  if (recording.matches.empty() && recording.tracks.empty()) {
+    std::vector<CameraRotation> rotations;
+    for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
+      rotations.push_back(pair.rotation);
+    }
+    return rotations;
+  }
+  return rotations_at(recording.camera.focal_px.value_or(0.8 * recording.camera.width_px));
+}
+
+// Part of a progress: a stage's share of the whole.
+Progress Part(const Progress& progress, double from, double to) {
+  return [=](const std::string& stage, double done) {
+    if (progress) progress(stage, from + (to - from) * done);
+  };
+}
+
+void AddUnique(const std::string& name, std::vector<std::string>* names) {
+  if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
+}
+
+}  // namespace
+
+Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_at,
+                   const DiagnoseOptions& options, const Progress& progress) {
+  Diagnosis diagnosis;
+  diagnosis.faults = FindDataFaults(recording);
+  Result<CalibrationReport> before =
+      CalibrateRecording(recording, rotations_at, options.calibrate, Part(progress, 0.0, 1.0));
+  if (!before && before.error().kind == ErrorKind::kCannotEstimate) {
+    // A gyro in the wrong unit or with mirrored axes? A picture without the fast rotation?
+    if (const auto repaired = RepairGyro(rotations_at, options.calibrate.start, &recording)) {
+      diagnosis.faults.push_back(*repaired);
+      before = CalibrateRecording(recording, rotations_at, options.calibrate, progress);
+    } else {
+      const std::vector<CameraRotation> rotations = NeighbourRotations(recording, rotations_at);
+      std::optional<std::string> found = FindElectronicStabilisation(recording, rotations);
+      if (recording.declared_stabilisation) {
+        found = "the file says so (" + *recording.declared_stabilisation + ")" +
+                (found ? ", and " + *found : "");
+      }
+      if (found) {
+        const EffectEntry* entry = FindEffect("electronic_stabilisation");
+        diagnosis.faults.push_back({entry->name, *found, entry->advice});
+      }
+    }
+  }
+  for (const DataFault& fault : diagnosis.faults) {
+    if (FindEffect(fault.name) != nullptr) AddUnique(fault.name, &diagnosis.effects);
+  }
+  if (!before) {
+    diagnosis.refusal = before.error();
+    return diagnosis;
+  }
+  diagnosis.before = *before;
+
+  const CalibrationReport& report = *diagnosis.before;
+  const bool attitudes = recording.matches.empty() && recording.tracks.empty();
+  LoopInput input;
+  input.recording = &recording;
+  input.prior = MakePrior(recording, report.start);
+  input.start = report.calibration;
+  input.graph = GraphOptionsFor(recording, report.start, options.calibrate);
+  input.noise = report.quality.noise_px;
+  if (!(input.noise > 0.0)) input.noise = attitudes ? 2e-3 : 1.0;
+  const Result<Calibration> found = FindEffects(input, options, progress, &diagnosis);
+  if (!found) {
+    diagnosis.not_tested = found.error().message;
+    return diagnosis;
+  }
+  const int bottom_up = kStateReadout;
+  const Calibration& c = diagnosis.before->calibration;
+  if (c.determined[static_cast<size_t>(bottom_up)] && c.readout_s < -5.0 * c.sigma()[bottom_up]) {
+    const EffectEntry* entry = FindEffect("readout_direction");
+    diagnosis.faults.push_back({entry->name,
+                                "the readout time is negative: rows are read from bottom to top",
+                                entry->advice});
+    AddUnique(entry->name, &diagnosis.effects);
+  }
+  if (found->effects) {
+    CalibrateOptions with = options.calibrate;
+    with.given_start = report.start;
+    with.from = *found;
+    const Result<CalibrationReport> after =
+        CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));
+    if (after) diagnosis.after = *after;
+  }
+  return diagnosis;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,531 @@
+// The loop: score every candidate in frames that the fit has not seen, refit the close rivals,
+// choose by unseen gain, report on frames that neither has seen.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/so3.h"
+#include "estimator/diagnosis/diagnose.h"
+#include "estimator/window/pair_view.h"
+
+namespace camgyro {
+namespace {
+
+// A candidate: an effect in one shape.
+struct Candidate {
+  const EffectEntry* entry = nullptr;
+  std::string shape;
+  std::shared_ptr<const Effect> effect;
+  int first = 0;  // column in the scores
+  std::vector<int> columns() const {
+    std::vector<int> c(static_cast<size_t>(effect->size()));
+    for (size_t i = 0; i < c.size(); ++i) c[i] = first + static_cast<int>(i);
+    return c;
+  }
+};
+
+// The model's effects and one more; another shape of the same effect takes its place, steps of the
+// delay add up. Values carry over.
+void AddEffect(const Candidate& candidate, Calibration* calibration) {
+  auto set = std::make_shared<EffectSet>();
+  std::vector<double> values;
+  if (calibration->effects) {
+    for (const auto& item : calibration->effects->items()) {
+      if (item.entry == candidate.entry && item.entry->name != "delay_step") continue;
+      set->Add(item.entry, item.shape, item.effect);
+      for (int k = 0; k < item.effect->size(); ++k) {
+        values.push_back(calibration->effect_values[item.first + k]);
+      }
+    }
+  }
+  set->Add(candidate.entry, candidate.shape, candidate.effect);
+  values.resize(static_cast<size_t>(set->size()), 0.0);
+  calibration->effects = set;
+  calibration->effect_values =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  calibration->effect_covariance = Eigen::MatrixXd::Zero(set->size(), set->size());
+}
+
+Eigen::VectorXd PriorInformation(const Calibration& prior, const EffectSet* model,
+                                 const EffectSet& candidates) {
+  const int present = model != nullptr ? model->size() : 0;
+  Eigen::VectorXd information(kStateSize + present + candidates.size());
+  information.head<kStateSize>() = prior.prior_sigma.cwiseAbs2().cwiseInverse();
+  for (int i = 0; i < present; ++i) {
+    information[kStateSize + i] = std::pow(model->parameter(i).spread, -2.0);
+  }
+  for (int i = 0; i < candidates.size(); ++i) {
+    information[kStateSize + present + i] = std::pow(candidates.parameter(i).spread, -2.0);
+  }
+  return information;
+}
+
+// Fall of chi2 by block; blocks that one of the two could not evaluate count nothing.
+std::vector<double> Fall(const Scores& before, const Scores& after) {
+  std::vector<double> fall;
+  for (const BlockScore& b : before.blocks) {
+    for (const BlockScore& a : after.blocks) {
+      if (a.time_s == b.time_s && a.pairs == b.pairs) fall.push_back(b.chi2 - a.chi2);
+    }
+  }
+  return fall;
+}
+
+double Chi2Of(const Scores& scores) {
+  double chi2 = 0.0;
+  for (const BlockScore& block : scores.blocks) chi2 += block.chi2;
+  return chi2;
+}
+
+ReportShare Summarise(const Scores& scores, double noise) {
+  ReportShare share;
+  for (const BlockScore& block : scores.blocks) {
+    share.pairs += block.pairs;
+    share.residuals += block.residuals;
+  }
+  if (share.residuals > 0) {
+    share.chi2 = Chi2Of(scores) / share.residuals;
+    share.rms_px = noise * std::sqrt(share.chi2);
+  }
+  return share;
+}
+
+class Loop {
+ public:
+  Loop(const LoopInput& in, const DiagnoseOptions& options, const Progress& progress)
+      : in_(in),
+        options_(options),
+        progress_(progress),
+        input_(MakeEstimationInput(*in.recording)),
+        shares_(MakeShares(*in.recording, input_)) {
+    for (const auto* blocks : {&shares_.fit, &shares_.choice, &shares_.report}) {
+      for (const PairBlock& block : *blocks) pairs_ += block.size();
+    }
+  }
+
+  Result<Calibration> Run(Diagnosis* out) {
+    out->block_s = shares_.block_s;
+    out->report_shares_tracks = shares_.report_shares_tracks;
+    out->fit_pairs = static_cast<int>(Joined(shares_.fit).size());
+    out->choice_pairs = static_cast<int>(Joined(shares_.choice).size());
+    out->report_pairs = static_cast<int>(Joined(shares_.report).size());
+    if (shares_.choice.size() < 5 || out->fit_pairs < 40 || out->choice_pairs < 40) {
+      out->not_tested = "too short to test anything: " + std::to_string(out->fit_pairs) +
+                        " pairs of frames to fit and " + std::to_string(out->choice_pairs) +
+                        " to choose by, in " + std::to_string(shares_.choice.size()) +
+                        " stretches; at least 40, 40 and 5 are needed";
+      return in_.start;
+    }
+    Calibration start = in_.start;
+    start.prior_sigma = in_.prior.prior_sigma;
+    const Result<Refined> first = Fit(start, in_.noise);
+    if (!first) return tl::unexpected(first.error());
+    fit_ = *first;
+    for (int round = 0; round < options_.max_rounds; ++round) {
+      Tell(round);
+      DiagnosisRound result;
+      const bool added = Round(round, &result);
+      if (round == 0) out->maps_before = last_maps_;
+      out->maps_after = last_maps_;
+      out->rounds.push_back(std::move(result));
+      if (!added) break;
+    }
+    if (!out->rounds.empty() && !out->rounds.back().added.empty()) {
+      // The last round allowed has added something: what is left then was not looked at yet.
+      DiagnosisRound rest;
+      const int keep = options_.max_rounds;
+      Round(keep, &rest, /*may_add=*/false);
+      out->maps_after = last_maps_;
+      out->rounds.push_back(std::move(rest));
+    }
+    std::vector<std::pair<double, std::string>> where;
+    for (const StructureMap& map : out->maps_after) {
+      if (IsStructure(map)) where.emplace_back(map.p_value, map.name);
+    }
+    std::sort(where.begin(), where.end());
+    for (const auto& entry : where) out->where.push_back(entry.second);
+    out->unexplained_structure = !where.empty();
+    Aliases(out);
+    if (fit_.calibration.effects) {
+      for (const auto& item : fit_.calibration.effects->items()) {
+        out->effects.push_back(item.entry->name);
+      }
+    }
+    return fit_.calibration;
+  }
+
+ private:
+  static constexpr double kAliasLimit = 0.95;
+  static constexpr double kStrongMisfit = 0.02;  // gain of one effect over chi2
+
+  void Tell(int round) const {
+    if (progress_) progress_("diagnosis", std::min(0.99, (round + 0.2) / options_.max_rounds));
+  }
+
+  bool IsStructure(const StructureMap& map) const {
+    const double tests = static_cast<double>(last_maps_.size());
+    if (map.dof == 0) return false;
+    if (map.name == "delay frame by frame") {
+      // Its chi2 depends on the noise model to some percent: it must be larger by half.
+      return map.statistic > 1.5 * map.dof && map.p_value < 1e-6;
+    }
+    return map.p_value * tests < 0.1 * options_.significance;
+  }
+
+  Result<Refined> Fit(const Calibration& start, double noise) const {
+    RefinementOptions refinement = options_.calibrate.refinement;
+    refinement.graph = in_.graph;
+    refinement.graph.sigma_px = noise;
+    refinement.sigma_rad = noise;
+    refinement.cluster_s = shares_.block_s;
+    refinement.max_rounds = 5;
+    return Refine(input_, Joined(shares_.fit), start, in_.prior, refinement);
+  }
+
+  Scores ScoresOf(const std::vector<PairBlock>& blocks, const Calibration& calibration,
+                  std::shared_ptr<const EffectSet> candidates, double noise) const {
+    return ComputeScores(input_, blocks, calibration, std::move(candidates), noise, in_.graph);
+  }
+
+  std::vector<Candidate> Candidates(const EffectSetup& setup) const {
+    std::vector<Candidate> candidates;
+    const EffectSet* model = fit_.calibration.effects.get();
+    for (const EffectEntry& entry : EffectCatalogue()) {
+      size_t present_size = 0;
+      bool present = false;
+      if (model != nullptr) {
+        for (const auto& item : model->items()) {
+          if (item.entry != &entry) continue;
+          present = true;
+          present_size = static_cast<size_t>(item.effect->size());
+        }
+      }
+      for (const std::string& shape : entry.shapes(setup)) {
+        std::shared_ptr<const Effect> effect = entry.make(setup, shape);
+        if (effect == nullptr || effect->turn_sigma_rad() > 0.0) continue;
+        if (present && static_cast<size_t>(effect->size()) <= present_size) continue;
+        candidates.push_back({&entry, shape, std::move(effect), 0});
+      }
+    }
+    return candidates;
+  }
+
+  // One round. True if an effect was added (fit_ has it then).
+  bool Round(int round, DiagnosisRound* result, bool may_add = true) {
+    const Calibration& model = fit_.calibration;
+    const double noise = fit_.quality.noise_px;
+    const EffectSetup setup = MakeEffectSetup(*in_.recording, model);
+    std::vector<Candidate> candidates = Candidates(setup);
+    auto set = std::make_shared<EffectSet>();
+    const int present = kStateSize + static_cast<int>(model.effect_values.size());
+    for (Candidate& candidate : candidates) {
+      candidate.first = present + set->size();
+      set->Add(candidate.entry, candidate.shape, candidate.effect);
+    }
+    const StructureMaps maps(setup, model.bias_gyro_rad_s);
+    const int first_map = present + set->size();
+    auto with_maps = std::make_shared<EffectSet>(*set);
+    for (const auto& item : maps.set()->items()) {
+      with_maps->Add(item.entry, item.shape, item.effect);
+    }
+    const Scores choice = ScoresOf(shares_.choice, model, with_maps, noise);
+    const Scores fit = ScoresOf(shares_.fit, model, set, noise);
+    const Eigen::VectorXd prior = PriorInformation(in_.prior, model.effects.get(), *with_maps);
+    const Eigen::VectorXd fit_prior = prior.head(first_map);
+    last_maps_ = maps.Evaluate(choice, first_map, prior);
+    result->before = result->after =
+        Summarise(ScoresOf(shares_.report, model, nullptr, noise), noise);
+
+    const auto gain_of_fit_step = [&](const std::vector<int>& columns) {
+      Eigen::VectorXd step = Eigen::VectorXd::Zero(prior.size());
+      step.head(first_map) = StepOf(fit, columns, fit_prior);
+      return GainOfStep(choice, step);
+    };
+    const std::vector<double> without = gain_of_fit_step({});
+    std::vector<std::pair<CandidateResult, Candidate>> all;
+    for (const Candidate& candidate : candidates) {
+      const ScoreTest test = TestColumns(choice, candidate.columns(), prior);
+      std::vector<double> gain = gain_of_fit_step(candidate.columns());
+      for (size_t i = 0; i < gain.size(); ++i) gain[i] -= without[i];
+      all.emplace_back(MakeResult(candidate, test, SumOf(gain)), candidate);
+    }
+    AddStepCandidate(setup, fit, choice, prior, &all);
+    AddTurnCandidate(setup, choice, &all);
+
+    // Significance, all candidates together, and a gain beyond its own noise.
+    const double tests = static_cast<double>(all.size());
+    for (auto& [r, candidate] : all) {
+      if (r.p_value * tests > options_.significance) {
+        r.rejected = "not significant";
+      } else if (r.gain.sum < 2.0 * r.gain.sigma) {
+        r.rejected = "no gain on unseen frames beyond its noise";
+      }
+    }
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
+      if (a.first.rejected.empty() != b.first.rejected.empty()) return a.first.rejected.empty();
+      return a.first.gain.sum > b.first.gain.sum;
+    });
+    bool added = false;
+    if (may_add && !all.empty() && all.front().first.rejected.empty()) {
+      added = Contest(round, choice, noise, &all, result);
+    }
+    for (auto& entry : all) result->candidates.push_back(std::move(entry.first));
+    return added;
+  }
+
+  CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
+                             const Gain& gain) const {
+    CandidateResult r;
+    r.name = candidate.entry->name;
+    r.shape = candidate.shape;
+    r.parameters = candidate.effect->size();
+    r.statistic = test.statistic;
+    r.p_value = test.dof > 0 ? test.p_value : 1.0;
+    r.inflation = test.inflation;
+    r.gain = gain;
+    r.parameter_info = candidate.effect->parameters();
+    r.estimate = test.estimate;
+    if (test.covariance.rows() == test.estimate.size()) {
+      r.sigma = test.covariance.diagonal().cwiseSqrt();
+    }
+    return r;
+  }
+
+  void AddStepCandidate(const EffectSetup& setup, const Scores& fit, const Scores& choice,
+                        const Eigen::VectorXd& prior,
+                        std::vector<std::pair<CandidateResult, Candidate>>* all) const {
+    const EffectEntry* entry = FindEffect("delay_step");
+    const double margin_s = 1.5 * shares_.block_s;
+    const StepSearch found = SearchDelayStep(choice, prior, margin_s);
+    if (found.test.dof == 0) return;
+    // When: by both shares, since the step may lie in a block of either. The fit share is given the
+    // blocks' numbers after those of the choice share.
+    Scores joint = choice;
+    const int offset = static_cast<int>(choice.blocks.size());
+    for (BlockScore block : fit.blocks) {
+      block.g.conservativeResize(choice.blocks[0].g.size());
+      block.H.conservativeResize(choice.blocks[0].H.rows(), choice.blocks[0].H.cols());
+      joint.blocks.push_back(std::move(block));
+    }
+    for (PairScore pair : fit.pairs) {
+      pair.block += offset;
+      joint.pairs.push_back(std::move(pair));
+    }
+    std::sort(joint.pairs.begin(), joint.pairs.end(),
+              [](const PairScore& a, const PairScore& b) { return a.time_s < b.time_s; });
+    const StepSearch when = SearchDelayStep(joint, prior, margin_s);
+    if (when.test.dof == 0) return;
+    char shape[40];
+    // Between two frames: a step shows from its first frame on.
+    std::snprintf(shape, sizeof shape, "%.4f", when.time_s - 1e-3);
+    Candidate candidate{entry, shape, entry->make(setup, shape), 0};
+    if (candidate.effect == nullptr) return;
+    // The gain on the choice share of a step as the fit share has it: by refit only. Here, what the
+    // statistic lets expect.
+    Gain gain;
+    gain.sum = found.test.statistic - 1.0;
+    gain.sigma = std::sqrt(2.0 + 4.0 * found.test.statistic) / 2.0;
+    all->emplace_back(MakeResult(candidate, found.test, gain), candidate);
+    all->back().first.estimate = when.test.estimate;
+  }
+
+  void AddTurnCandidate(const EffectSetup& setup, const Scores& choice,
+                        std::vector<std::pair<CandidateResult, Candidate>>* all) const {
+    const EffectEntry* entry = FindEffect("translation_acceleration");
+    if (!setup.has_pixels ||
+        (fit_.calibration.effects && fit_.calibration.effects->Has(entry->name))) {
+      return;
+    }
+    Candidate candidate{entry, "turn", entry->make(setup, "turn"), 0};
+    std::vector<double> gain(choice.blocks.size(), 0.0);
+    for (const PairScore& pair : choice.pairs) {
+      gain[static_cast<size_t>(pair.block)] += pair.turn_gain;
+    }
+    ScoreTest test;
+    test.estimate.resize(0);
+    test.dof = 1;
+    const Gain sum = SumOf(gain);
+    test.statistic = std::max(0.0, sum.sum);
+    // No parameter was fitted: by Markov's inequality a likelihood ratio exceeds x with a
+    // probability below 1/x under the narrow prior.
+    test.p_value = std::exp(-0.5 * test.statistic);
+    all->emplace_back(MakeResult(candidate, test, sum), candidate);
+  }
+
+  // Refits the close rivals and adds the best. `all` is sorted.
+  bool Contest(int round, const Scores& choice, double noise,
+               std::vector<std::pair<CandidateResult, Candidate>>* all, DiagnosisRound* result) {
+    struct Rival {
+      size_t at;
+      Refined fit;
+      std::vector<double> gain;
+    };
+    std::vector<Rival> rivals;
+    const double best_gain = all->front().first.gain.sum;
+    for (size_t i = 0; i < all->size(); ++i) {
+      auto& [r, candidate] = (*all)[i];
+      if (!r.rejected.empty()) break;
+      if (static_cast<int>(rivals.size()) >= options_.max_rivals || r.gain.sum < 0.25 * best_gain) {
+        r.rejected = "others gain more";
+        continue;
+      }
+      Calibration start = fit_.calibration;
+      AddEffect(candidate, &start);
+      start.prior_sigma = in_.prior.prior_sigma;
+      Result<Refined> fit = Fit(start, noise);
+      if (round == 0 && best_gain > kStrongMisfit * Chi2Of(choice)) {
+        // What the plain model made of the effect may be far off: also from where it all began.
+        Calibration anew = in_.start;
+        AddEffect(candidate, &anew);
+        anew.prior_sigma = in_.prior.prior_sigma;
+        const Result<Refined> other = Fit(anew, in_.noise);
+        if (other && (!fit || FitChi2(*other) < FitChi2(*fit))) fit = other;
+      }
+      if (fit && Remake(&fit->calibration)) {
+        Calibration again = fit->calibration;
+        again.prior_sigma = in_.prior.prior_sigma;
+        const Result<Refined> better = Fit(again, fit->quality.noise_px);
+        if (better) fit = better;
+      }
+      if (!fit) {
+        r.rejected = "the fit with it failed: " + fit.error().message;
+        continue;
+      }
+      r.refitted = true;
+      const Scores with = ScoresOf(shares_.choice, fit->calibration, nullptr, noise);
+      Rival rival{i, *fit, Fall(choice, with)};
+      r.gain = SumOf(rival.gain);
+      const EffectSet::Item& item = fit->calibration.effects->items().back();
+      r.estimate = fit->calibration.effect_values.segment(item.first, item.effect->size());
+      r.sigma = fit->calibration.effect_covariance.diagonal()
+                    .segment(item.first, item.effect->size())
+                    .cwiseSqrt();
+      for (int k = 0; k < item.effect->size(); ++k) {
+        const EffectParameter& p = r.parameter_info[static_cast<size_t>(k)];
+        if (r.estimate[k] < p.plausible_min - 2.0 * r.sigma[k] ||
+            r.estimate[k] > p.plausible_max + 2.0 * r.sigma[k]) {
+          r.rejected = p.name + " outside of what real devices show";
+        }
+      }
+      if (r.rejected.empty() && r.gain.sum < 2.0 * r.gain.sigma) {
+        r.rejected = "no gain on unseen frames beyond its noise";
+      }
+      if (r.rejected.empty()) rivals.push_back(std::move(rival));
+    }
+    if (rivals.empty()) return false;
+    const auto gain_of = [&](const Rival& rival) { return (*all)[rival.at].first.gain.sum; };
+    const auto size_of = [&](const Rival& rival) { return (*all)[rival.at].first.parameters; };
+    size_t winner = 0;
+    for (size_t i = 1; i < rivals.size(); ++i) {
+      if (gain_of(rivals[i]) > gain_of(rivals[winner])) winner = i;
+    }
+    // One with fewer parameters that is no worse beyond the noise of the difference.
+    for (size_t i = 0; i < rivals.size(); ++i) {
+      if (size_of(rivals[i]) >= size_of(rivals[winner]) ||
+          rivals[i].gain.size() != rivals[winner].gain.size()) {
+        continue;
+      }
+      std::vector<double> difference;
+      for (size_t b = 0; b < rivals[i].gain.size(); ++b) {
+        difference.push_back(rivals[winner].gain[b] - rivals[i].gain[b]);
+      }
+      const Gain behind = SumOf(difference);
+      if (behind.sum < 2.0 * behind.sigma) winner = i;
+    }
+    for (size_t i = 0; i < rivals.size(); ++i) {
+      if (i != winner) (*all)[rivals[i].at].first.rejected = "another explains more";
+    }
+    const Rival& best = rivals[winner];
+    const CandidateResult& chosen = (*all)[best.at].first;
+    result->added = chosen.name;
+    result->shape = chosen.shape;
+    result->shift_sigmas =
+        Difference(best.fit.calibration, fit_.calibration).cwiseQuotient(fit_.calibration.sigma());
+    // Before and after in frames that nobody has seen, both with the noise before.
+    const Scores before = ScoresOf(shares_.report, fit_.calibration, nullptr, noise);
+    const Scores after = ScoresOf(shares_.report, best.fit.calibration, nullptr, noise);
+    result->before = Summarise(before, noise);
+    result->after = Summarise(after, noise);
+    result->report_gain = SumOf(Fall(before, after));
+    fit_ = best.fit;
+    std::rotate(all->begin(), all->begin() + static_cast<std::ptrdiff_t>(best.at),
+                all->begin() + static_cast<std::ptrdiff_t>(best.at) + 1);
+    return true;
+  }
+
+  // Makes those effects anew that depend on the calibration; false if there are none.
+  bool Remake(Calibration* calibration) const {
+    auto set = std::make_shared<EffectSet>();
+    bool remade = false;
+    const EffectSetup setup = MakeEffectSetup(*in_.recording, *calibration);
+    for (const auto& item : calibration->effects->items()) {
+      std::shared_ptr<const Effect> effect = item.effect;
+      if (effect->depends_on_calibration()) {
+        effect = item.entry->make(setup, item.shape);
+        remade = true;
+      }
+      set->Add(item.entry, item.shape, effect);
+    }
+    calibration->effects = set;
+    return remade;
+  }
+
+  double FitChi2(const Refined& fit) const { return fit.quality.rms_px; }
+
+  // Pairs of effects, one of them in the model or found significant, that this motion cannot tell
+  // apart.
+  void Aliases(Diagnosis* out) const {
+    if (!fit_.calibration.effects) return;
+    Calibration plain = fit_.calibration;
+    const EffectSetup setup = MakeEffectSetup(*in_.recording, plain);
+    auto set = std::make_shared<EffectSet>();
+    std::vector<Candidate> all;
+    for (const auto& item : fit_.calibration.effects->items()) {
+      all.push_back({item.entry, item.shape, item.effect, 0});
+    }
+    const size_t in_model = all.size();
+    for (const Candidate& candidate : Candidates(setup)) {
+      if (!fit_.calibration.effects->Has(candidate.entry->name)) all.push_back(candidate);
+    }
+    for (Candidate& candidate : all) {
+      candidate.first = kStateSize + set->size();
+      set->Add(candidate.entry, candidate.shape, candidate.effect);
+    }
+    // Scores at the fit, but with the effects as candidates, so that they are not projected out:
+    // the derivatives hardly depend on where they are taken.
+    plain.effects = nullptr;
+    plain.effect_values.resize(0);
+    plain.lens = fit_.calibration.FullLens();
+    const Scores scores = ScoresOf(shares_.choice, plain, set, fit_.quality.noise_px);
+    if (scores.blocks.size() < 4) return;
+    const Eigen::VectorXd prior = PriorInformation(in_.prior, nullptr, *set);
+    for (size_t i = 0; i < in_model; ++i) {
+      for (size_t j = i + 1; j < all.size(); ++j) {
+        if (all[i].columns().empty() || all[j].columns().empty()) continue;
+        // A flexible curve contains simpler effects: that is no alias of the motion.
+        if (all[j].columns().size() > 3 * all[i].columns().size() + 3) continue;
+        if (AliasOf(scores, all[i].columns(), all[j].columns(), prior) > kAliasLimit) {
+          out->indistinguishable.push_back({all[i].entry->name, all[j].entry->name});
+        }
+      }
+    }
+  }
+
+  const LoopInput& in_;
+  const DiagnoseOptions& options_;
+  const Progress& progress_;
+  const EstimationInput input_;
+  const Shares shares_;
+  size_t pairs_ = 0;
+  Refined fit_;
+  std::vector<StructureMap> last_maps_;
+};
+
+}  // namespace
+
+Result<Calibration> FindEffects(const LoopInput& input, const DiagnoseOptions& options,
+                                const Progress& progress, Diagnosis* diagnosis) {
+  return Loop(input, options, progress).Run(diagnosis);
+}
+
+}  // namespace camgyro

@@ -1,0 +1,57 @@
+// Scores: the derivative of the fit's cost by every parameter that is, or could be, in the model,
+// with what belongs to one pair of frames alone (direction, its turn, the noise of the gyro)
+// projected out.
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SCORES_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SCORES_H_
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/effects/catalogue.h"
+#include "estimator/diagnosis/shares.h"
+#include "estimator/window/pair_graph.h"
+
+namespace camgyro {
+
+// Columns: the state (StateIndex), then the parameters of the effects in the model, then those of
+// the candidates. Residuals are in sigmas, bent by the robust loss, and
+//   chi2(x) = chi2 + 2 g.x + x.H x  to second order in a change x of the parameters.
+struct BlockScore {
+  double time_s = 0.0;  // middle of the block, camera clock
+  int pairs = 0;
+  int residuals = 0;  // that could vary: without two per pair for its direction
+  double chi2 = 0.0;
+  Eigen::VectorXd g;
+  Eigen::MatrixXd H;
+};
+
+// One pair. g has all columns, H only those of state and effects in the model.
+struct PairScore {
+  int frame_b = 0;  // second frame, index into Recording::frames
+  double time_s = 0.0;
+  int block = 0;
+  double chi2 = 0.0;
+  int residuals = 0;
+  Eigen::VectorXd g;
+  Eigen::MatrixXd H;
+  // 2 log of the likelihood ratio of a direction that turns freely (0.6 rad per pair) against one
+  // that turns as the model allows.
+  double turn_gain = 0.0;
+};
+
+struct Scores {
+  int num_model = 0;  // state and effects in the model
+  std::vector<BlockScore> blocks;
+  std::vector<PairScore> pairs;
+};
+
+// `candidates` may be null. noise: of a pixel [px], of a rotation [rad] for attitudes.
+Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>& blocks,
+                     const Calibration& calibration, std::shared_ptr<const EffectSet> candidates,
+                     double noise, const PairGraphOptions& options);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SCORES_H_

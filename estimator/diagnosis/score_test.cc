@@ -1,0 +1,304 @@
+#include "estimator/diagnosis/score_test.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <unsupported/Eigen/SpecialFunctions>
+
+namespace camgyro {
+namespace {
+
+Eigen::VectorXd Pick(const Eigen::VectorXd& v, const std::vector<int>& at) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(at.size()));
+  for (size_t i = 0; i < at.size(); ++i) out[static_cast<Eigen::Index>(i)] = v[at[i]];
+  return out;
+}
+
+Eigen::MatrixXd Pick(const Eigen::MatrixXd& m, const std::vector<int>& rows,
+                     const std::vector<int>& cols) {
+  Eigen::MatrixXd out(rows.size(), cols.size());
+  for (size_t i = 0; i < rows.size(); ++i) {
+    for (size_t j = 0; j < cols.size(); ++j) {
+      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = m(rows[i], cols[j]);
+    }
+  }
+  return out;
+}
+
+struct Sum {
+  Eigen::VectorXd g;
+  Eigen::MatrixXd H;
+};
+
+Sum SumBlocks(const Scores& scores) {
+  Sum sum{scores.blocks.front().g, scores.blocks.front().H};
+  for (size_t i = 1; i < scores.blocks.size(); ++i) {
+    sum.g += scores.blocks[i].g;
+    sum.H += scores.blocks[i].H;
+  }
+  return sum;
+}
+
+std::vector<int> ModelColumns(const Scores& scores) {
+  std::vector<int> model(static_cast<size_t>(scores.num_model));
+  for (int i = 0; i < scores.num_model; ++i) model[static_cast<size_t>(i)] = i;
+  return model;
+}
+
+// Symmetric positive solve that survives columns without information: unit diagonal, small ridge.
+class Solver {
+ public:
+  explicit Solver(const Eigen::MatrixXd& H)
+      : scale_(H.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse()) {
+    Eigen::MatrixXd unit = scale_.asDiagonal() * H * scale_.asDiagonal();
+    unit.diagonal().array() += 1e-10;
+    ldlt_.compute(unit);
+  }
+  template <typename Derived>
+  typename Derived::PlainObject Solve(const Eigen::MatrixBase<Derived>& b) const {
+    return scale_.asDiagonal() * ldlt_.solve(scale_.asDiagonal() * b);
+  }
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
+};
+
+// Score, information and residual scores by block of `columns`, the model's projected out.
+struct Effective {
+  Eigen::VectorXd s;
+  Eigen::MatrixXd M;
+  Eigen::VectorXd estimate;
+  std::vector<Eigen::VectorXd> rest;   // scores that the fitted columns leave, by block
+  std::vector<Eigen::VectorXd> pairs;  // scores by pair
+};
+
+Effective Project(const Scores& scores, const std::vector<int>& columns,
+                  const Eigen::VectorXd& prior_information) {
+  const Sum sum = SumBlocks(scores);
+  const std::vector<int> model = ModelColumns(scores);
+  Eigen::MatrixXd H_mm = Pick(sum.H, model, model);
+  H_mm.diagonal() += Pick(prior_information, model);
+  const Solver model_solver(H_mm);
+  const Eigen::MatrixXd H_mc = Pick(sum.H, model, columns);
+  const Eigen::MatrixXd X = model_solver.Solve(H_mc);  // model x columns
+  const Eigen::VectorXd g_m = Pick(sum.g, model);
+  Effective e;
+  e.s = Pick(sum.g, columns) - X.transpose() * g_m;
+  e.M = Pick(sum.H, columns, columns) - H_mc.transpose() * X;
+  e.M = 0.5 * (e.M + e.M.transpose()).eval();
+  Eigen::MatrixXd with_prior = e.M;
+  with_prior.diagonal() += Pick(prior_information, columns);
+  e.estimate = -Solver(with_prior).Solve(e.s);
+  const Eigen::VectorXd model_step = -model_solver.Solve(Eigen::VectorXd(g_m + H_mc * e.estimate));
+  for (const BlockScore& block : scores.blocks) {
+    const Eigen::VectorXd left_m = Pick(block.g, model) + Pick(block.H, model, model) * model_step +
+                                   Pick(block.H, model, columns) * e.estimate;
+    const Eigen::VectorXd left_c = Pick(block.g, columns) +
+                                   Pick(block.H, columns, model) * model_step +
+                                   Pick(block.H, columns, columns) * e.estimate;
+    e.rest.push_back(left_c - X.transpose() * left_m);
+  }
+  for (const PairScore& pair : scores.pairs) {
+    if (pair.g.size() != sum.g.size()) break;  // the caller has no scores by pair
+    e.pairs.push_back(Pick(pair.g, columns) - X.transpose() * Pick(pair.g, model));
+  }
+  return e;
+}
+
+ScoreTest Judge(const Effective& e, const Eigen::VectorXd& prior) {
+  ScoreTest test;
+  // Directions with information beyond the prior's.
+  const Eigen::VectorXd scale = prior.cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * e.M *
+                                                             scale.asDiagonal());
+  std::vector<Eigen::VectorXd> directions;  // whitening
+  for (Eigen::Index i = 0; i < eigen.eigenvalues().size(); ++i) {
+    const double value = eigen.eigenvalues()[i];
+    if (value > 1.0) {
+      directions.emplace_back(scale.cwiseProduct(eigen.eigenvectors().col(i)) / std::sqrt(value));
+    }
+  }
+  test.dof = static_cast<int>(directions.size());
+  test.estimate = e.estimate;
+  if (test.dof == 0 || e.rest.size() < 4) {
+    test.dof = 0;
+    test.covariance = Eigen::MatrixXd::Zero(prior.size(), prior.size());
+    return test;
+  }
+  double chi2 = 0.0, scatter = 0.0, pair_scatter = 0.0;
+  for (const Eigen::VectorXd& direction : directions) {
+    const double z = direction.dot(e.s);
+    chi2 += z * z;
+    for (const Eigen::VectorXd& rest : e.rest) {
+      const double part = direction.dot(rest);
+      scatter += part * part;
+    }
+    for (const Eigen::VectorXd& pair : e.pairs) {
+      const double part = direction.dot(pair);
+      pair_scatter += part * part;
+    }
+  }
+  const double free = static_cast<double>(e.rest.size()) - 1.0;
+  // Each direction took one degree of freedom from the sum of the blocks' rests.
+  // (Columns that live in one block leave nothing there: for them the pairs count.)
+  test.inflation =
+      std::max({1.0, scatter / test.dof * (free + 1.0) / free, pair_scatter / test.dof});
+  test.statistic = chi2 / test.inflation;
+  test.p_value = FTail(test.statistic / test.dof, test.dof, test.dof * free);
+  Eigen::MatrixXd with_prior = e.M / test.inflation;
+  with_prior.diagonal() += prior;
+  test.covariance = with_prior.inverse();
+  return test;
+}
+
+}  // namespace
+
+double ChiSquareTail(double value, double dof) {
+  const Eigen::Array<double, 1, 1> a(0.5 * dof), x(0.5 * std::max(0.0, value));
+  return Eigen::igammac(a, x)(0);
+}
+
+double FTail(double value, double dof1, double dof2) {
+  // Q = I_{d2 / (d2 + d1 F)}(d2 / 2, d1 / 2)
+  const Eigen::Array<double, 1, 1> a(0.5 * dof2), b(0.5 * dof1),
+      x(dof2 / (dof2 + dof1 * std::max(0.0, value)));
+  return Eigen::betainc(a, b, x)(0);
+}
+
+ScoreTest TestColumns(const Scores& scores, const std::vector<int>& columns,
+                      const Eigen::VectorXd& prior_information) {
+  if (scores.blocks.size() < 4) return {};
+  return Judge(Project(scores, columns, prior_information), Pick(prior_information, columns));
+}
+
+Eigen::VectorXd StepOf(const Scores& scores, const std::vector<int>& columns,
+                       const Eigen::VectorXd& prior_information) {
+  const Sum sum = SumBlocks(scores);
+  std::vector<int> free = ModelColumns(scores);
+  free.insert(free.end(), columns.begin(), columns.end());
+  Eigen::MatrixXd H = Pick(sum.H, free, free);
+  H.diagonal() += Pick(prior_information, free);
+  const Eigen::VectorXd x = -Solver(H).Solve(Pick(sum.g, free));
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(sum.g.size());
+  for (size_t i = 0; i < free.size(); ++i) step[free[i]] = x[static_cast<Eigen::Index>(i)];
+  return step;
+}
+
+Gain SumOf(const std::vector<double>& gain_by_block) {
+  Gain gain;
+  const auto n = static_cast<double>(gain_by_block.size());
+  for (const double g : gain_by_block) gain.sum += g;
+  double variance = 0.0;
+  for (const double g : gain_by_block) variance += (g - gain.sum / n) * (g - gain.sum / n);
+  gain.sigma = n > 1.0 ? std::sqrt(variance * n / (n - 1.0)) : 0.0;
+  return gain;
+}
+
+std::vector<double> GainOfStep(const Scores& scores, const Eigen::VectorXd& step) {
+  std::vector<double> gains;
+  for (const BlockScore& block : scores.blocks) {
+    gains.push_back(-2.0 * block.g.dot(step) - step.dot(block.H * step));
+  }
+  return gains;
+}
+
+StepSearch SearchDelayStep(const Scores& scores, const Eigen::VectorXd& prior_information,
+                           double margin_s) {
+  StepSearch best;
+  if (scores.blocks.size() < 4 || scores.pairs.empty()) return best;
+  // A column for the step: the delay's own, for the pairs after it.
+  Scores extended;
+  extended.num_model = scores.num_model;
+  const Eigen::Index n = scores.num_model;
+  for (const BlockScore& block : scores.blocks) {
+    BlockScore wide;
+    wide.g = Eigen::VectorXd::Zero(n + 1);
+    wide.H = Eigen::MatrixXd::Zero(n + 1, n + 1);
+    wide.g.head(n) = block.g.head(n);
+    wide.H.topLeftCorner(n, n) = block.H.topLeftCorner(n, n);
+    extended.blocks.push_back(std::move(wide));
+  }
+  Eigen::VectorXd prior(n + 1);
+  prior << prior_information.head(n), 1.0 / (0.05 * 0.05);
+  const double first_s = scores.pairs.front().time_s, last_s = scores.pairs.back().time_s;
+  double first_used_s = last_s, last_used_s = first_s;
+  double best_chi2 = 0.0;  // before inflation, which changes with the time of the step
+  for (size_t i = scores.pairs.size(); i-- > 0;) {
+    const PairScore& pair = scores.pairs[i];
+    BlockScore& block = extended.blocks[static_cast<size_t>(pair.block)];
+    block.g[n] += pair.g[kStateDelay];
+    block.H.col(n).head(n) += pair.H.col(kStateDelay);
+    block.H.row(n).head(n) = block.H.col(n).head(n).transpose();
+    block.H(n, n) += pair.H(kStateDelay, kStateDelay);
+    if (pair.time_s < first_s + margin_s || pair.time_s > last_s - margin_s) continue;
+    first_used_s = std::min(first_used_s, pair.time_s);
+    last_used_s = std::max(last_used_s, pair.time_s);
+    const ScoreTest test = TestColumns(extended, {static_cast<int>(n)}, prior);
+    if (test.dof == 1 && test.statistic * test.inflation > best_chi2) {
+      best_chi2 = test.statistic * test.inflation;
+      best.test = test;
+      best.time_s = pair.time_s;
+      best.frame = pair.frame_b;
+    }
+  }
+  if (best.test.dof == 1 && last_used_s > first_used_s) {
+    const double duration = last_s - first_s;
+    const double e1 = (first_used_s - first_s) / duration, e2 = (last_s - last_used_s) / duration;
+    const double log_lambda = std::log((1.0 - e1) * (1.0 - e2) / std::max(1e-6, e1 * e2));
+    const double x = best.test.statistic;
+    const double sup =
+        std::sqrt(x / (2.0 * M_PI)) * std::exp(-0.5 * x) * ((1.0 - 1.0 / x) * log_lambda + 4.0 / x);
+    // The same number of searches as the formula has for the normal distribution, with F's tail.
+    best.test.p_value =
+        std::min(1.0, std::max(1.0, sup / ChiSquareTail(x, 1.0)) * best.test.p_value);
+  }
+  return best;
+}
+
+ScoreTest TestDelayOfPairs(const Scores& scores, const Eigen::VectorXd& prior_information) {
+  ScoreTest test;
+  const auto n = static_cast<Eigen::Index>(scores.pairs.size());
+  test.estimate = Eigen::VectorXd::Zero(n);
+  test.covariance = Eigen::MatrixXd::Zero(n, 1);
+  double scatter = 0.0, other = 0.0;
+  int count = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const PairScore& pair = scores.pairs[static_cast<size_t>(i)];
+    const double information = pair.H(kStateDelay, kStateDelay);
+    const double s = pair.g[kStateDelay];
+    const double prior = prior_information[kStateDelay];
+    test.estimate[i] = -s / (information + prior);
+    test.covariance(i, 0) = 1.0 / std::sqrt(information + prior);
+    if (information < prior || pair.H(kStateFocal, kStateFocal) <= 0.0) continue;
+    scatter += s * s / information;
+    other += pair.g[kStateFocal] * pair.g[kStateFocal] / pair.H(kStateFocal, kStateFocal);
+    ++count;
+  }
+  test.dof = count;
+  if (count == 0) return test;
+  test.inflation = std::max(1.0, other / count);
+  test.statistic = scatter / test.inflation;
+  test.p_value = ChiSquareTail(test.statistic, count);
+  return test;
+}
+
+double AliasOf(const Scores& scores, const std::vector<int>& first, const std::vector<int>& second,
+               const Eigen::VectorXd& prior_information) {
+  std::vector<int> both = first;
+  both.insert(both.end(), second.begin(), second.end());
+  const Effective e = Project(scores, both, prior_information);
+  const auto n = static_cast<Eigen::Index>(first.size());
+  const Eigen::Index m = e.M.cols() - n;
+  Eigen::MatrixXd A = e.M.topLeftCorner(n, n), B = e.M.bottomRightCorner(m, m);
+  A.diagonal() += Pick(prior_information, first);
+  B.diagonal() += Pick(prior_information, second);
+  // Canonical correlations: singular values of A^-1/2 C B^-1/2.
+  const Eigen::MatrixXd L_A = A.llt().matrixL(), L_B = B.llt().matrixL();
+  Eigen::MatrixXd C = e.M.topRightCorner(n, m);
+  C = L_A.triangularView<Eigen::Lower>().solve(C);
+  C = L_B.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd(C.transpose())).transpose();
+  return C.jacobiSvd().singularValues()[0];
+}
+
+}  // namespace camgyro

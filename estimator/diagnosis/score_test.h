@@ -1,0 +1,70 @@
+// Does an effect that the model lacks show in frames that the fit has not seen?
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_SCORE_TEST_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_SCORE_TEST_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/diagnosis/pair_scores.h"
+
+namespace camgyro {
+
+// Score (Lagrange multiplier) test of some columns, the model's own columns projected out.
+struct ScoreTest {
+  // chi-square of the columns over the inflation; F-distributed times `dof` under the model.
+  double statistic = 0.0;
+  int dof = 0;
+  double p_value = 1.0;
+  // Variance of the scores between blocks over what the noise lets expect, at least 1: what
+  // correlation within a block, outliers and unmodelled jitter make of it.
+  double inflation = 1.0;
+  Eigen::VectorXd estimate;  // one Gauss-Newton step from zero
+  Eigen::MatrixXd covariance;
+};
+
+// `columns`: indices into BlockScore::g. prior_information: of the model's columns (1 / sigma^2 of
+// their priors), and of the tested ones.
+ScoreTest TestColumns(const Scores& scores, const std::vector<int>& columns,
+                      const Eigen::VectorXd& prior_information);
+
+// Change of all columns by one Gauss-Newton step with some columns free beside the model's; the
+// others stay zero.
+Eigen::VectorXd StepOf(const Scores& scores, const std::vector<int>& columns,
+                       const Eigen::VectorXd& prior_information);
+
+// Sum over blocks of a gain, and its standard deviation from the scatter between blocks.
+struct Gain {
+  double sum = 0.0, sigma = 0.0;
+};
+Gain SumOf(const std::vector<double>& gain_by_block);
+
+// Fall of chi2 in each block if the parameters change by `step`.
+std::vector<double> GainOfStep(const Scores& scores, const Eigen::VectorXd& step);
+
+// Largest score statistic of a step of the delay over the time of the step.
+struct StepSearch {
+  ScoreTest test;       // p_value corrected for the search (James, James & Siegmund 1987)
+  double time_s = 0.0;  // of the second frame of the first pair after the step
+  int frame = 0;        // that frame, index into Recording::frames
+};
+// margin_s: from either end. Returns dof 0 if there are too few pairs.
+StepSearch SearchDelayStep(const Scores& scores, const Eigen::VectorXd& prior_information,
+                           double margin_s);
+
+// The delay of each pair on its own: more scatter than noise? statistic: chi2 over dof pairs, after
+// division by `inflation`, the same scatter of what has no time in it (the focal length), at
+// least 1. estimate: per pair [s]; covariance: one column, the sigma of each.
+ScoreTest TestDelayOfPairs(const Scores& scores, const Eigen::VectorXd& prior_information);
+
+// |cosine| between two effects: correlation of their estimates' directions after the model's
+// columns are projected out (canonical, the largest); near 1: this motion cannot tell them apart.
+double AliasOf(const Scores& scores, const std::vector<int>& first, const std::vector<int>& second,
+               const Eigen::VectorXd& prior_information);
+
+// Upper tails.
+double ChiSquareTail(double value, double dof);
+double FTail(double value, double dof1, double dof2);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_SCORE_TEST_H_

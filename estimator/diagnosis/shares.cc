@@ -1,0 +1,90 @@
+#include "estimator/diagnosis/shares.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace camgyro {
+namespace {
+
+enum Share { kFit, kChoice, kReport };
+constexpr Share kDeal[] = {kFit, kChoice, kFit, kChoice, kReport};
+
+// Leaves those matches of a pair whose track is not in `forbidden`. The matches of a pair from
+// tracks are in ascending order of the tracks that both frames see.
+void DropTracks(const std::vector<TrackedPoint>& a, const std::vector<TrackedPoint>& b,
+                const std::set<int64_t>& forbidden, std::vector<Match>* matches) {
+  std::vector<Match> kept;
+  size_t match = 0;
+  auto it = b.begin();
+  for (const TrackedPoint& point : a) {
+    while (it != b.end() && it->track_id < point.track_id) ++it;
+    if (it == b.end() || it->track_id != point.track_id) continue;
+    if (forbidden.count(point.track_id) == 0) kept.push_back((*matches)[match]);
+    ++match;
+  }
+  *matches = std::move(kept);
+}
+
+}  // namespace
+
+Shares MakeShares(const Recording& recording, const EstimationInput& input) {
+  Shares shares;
+  if (input.pairs.empty()) return shares;
+  const double begin_s = input.pairs.front().time_a_s;
+  const double duration_s = input.pairs.back().time_b_s - begin_s;
+  shares.block_s =
+      std::max(std::clamp(duration_s / 40.0, 0.7, 3.0), 6.0 * MedianInterval(recording.frames));
+  const auto block_of = [&](double time_s) {
+    return static_cast<int64_t>(std::floor((time_s - begin_s) / shares.block_s));
+  };
+  const auto share_of = [](int64_t block) { return kDeal[block % 5]; };
+
+  // Tracks that the other shares see.
+  std::set<int64_t> seen;
+  const bool has_tracks = recording.matches.empty() && !recording.tracks.empty();
+  if (has_tracks) {
+    for (const TimedPair& pair : input.pairs) {
+      if (share_of(block_of(pair.time_a_s)) == kReport) continue;
+      for (const TrackedPoint& point : recording.tracks[static_cast<size_t>(pair.frame_a)]) {
+        seen.insert(point.track_id);
+      }
+    }
+  }
+  constexpr size_t kMinMatches = 8;  // of a pair that can be evaluated
+  std::vector<PairBlock> report_all;
+  size_t usable = 0;
+  int64_t last_block = -1;
+  for (const TimedPair& pair : input.pairs) {
+    const int64_t block = block_of(pair.time_a_s);
+    if (block_of(pair.time_b_s) != block) continue;
+    const Share share = share_of(block);
+    std::vector<PairBlock>& blocks = share == kFit      ? shares.fit
+                                     : share == kChoice ? shares.choice
+                                                        : shares.report;
+    if (block != last_block) blocks.emplace_back();
+    last_block = block;
+    blocks.back().push_back(pair);
+    if (share == kReport && has_tracks) {
+      report_all.resize(shares.report.size());
+      report_all.back().push_back(pair);
+      DropTracks(recording.tracks[static_cast<size_t>(pair.frame_a)],
+                 recording.tracks[static_cast<size_t>(pair.frame_b)], seen,
+                 &blocks.back().back().matches);
+      usable += blocks.back().back().matches.size() >= kMinMatches ? 1 : 0;
+    }
+  }
+  if (has_tracks && usable < 20 && usable * 2 < Joined(report_all).size()) {
+    shares.report = std::move(report_all);
+    shares.report_shares_tracks = true;
+  }
+  return shares;
+}
+
+std::vector<TimedPair> Joined(const std::vector<PairBlock>& blocks) {
+  std::vector<TimedPair> pairs;
+  for (const PairBlock& block : blocks) pairs.insert(pairs.end(), block.begin(), block.end());
+  return pairs;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,35 @@
+// Which frames the fit, the choice of effects and the reported gain may see.
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_SHARES_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_SHARES_H_
+
+#include <vector>
+
+#include "core/recording.h"
+#include "estimator/window/estimation_input.h"
+
+namespace camgyro {
+
+// A stretch of frames that belong to one share.
+using PairBlock = std::vector<TimedPair>;
+
+struct Shares {
+  // Blocks of neighbouring pairs in time order, dealt out as fit, choice, fit, choice, report and
+  // so on. No frame is in two shares: pairs across the border of two blocks are in none. In
+  // `report`, no track that is in another share either. (A track may go on from a fit block into a
+  // choice block; the residuals of two frames have no point in common with others, only its noise
+  // in either frame, so that the two shares do not meet.)
+  std::vector<PairBlock> fit, choice, report;
+  double block_s = 0.0;
+  // The tracks live too long for that: `report` has tracks that other shares see, too.
+  bool report_shares_tracks = false;
+};
+
+// Short blocks, so that what changes with time is seen by all shares: 1/40 of the recording, within
+// 0.7 and 3 s, at least 6 frames.
+Shares MakeShares(const Recording& recording, const EstimationInput& input);
+
+std::vector<TimedPair> Joined(const std::vector<PairBlock>& blocks);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_SHARES_H_

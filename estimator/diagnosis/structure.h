@@ -1,0 +1,44 @@
+// Structure without a name: what is left over the image, row, time, rates, exposure and so on,
+// whatever the catalogue may say of it.
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_STRUCTURE_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_STRUCTURE_H_
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/effects/catalogue.h"
+#include "estimator/diagnosis/score_test.h"
+
+namespace camgyro {
+
+// One map: what a piecewise constant change along some axis would be, cell by cell.
+struct StructureMap {
+  std::string name;          // "image", "row", "delay over time", ...
+  std::string unit;          // of the values
+  std::vector<int> shape;    // cells: {n}, or {rows, columns} of an image; values: x and y in turn
+  std::vector<double> axis;  // middles of the cells along a one-dimensional map
+  std::string axis_unit;
+  Eigen::VectorXd value, sigma;
+  double statistic = 0.0, p_value = 1.0, inflation = 1.0;
+  int dof = 0;
+};
+
+// The maps that a recording can show, as an EffectSet whose parameters are the cells. They enter
+// ComputeScores as candidates.
+class StructureMaps {
+ public:
+  explicit StructureMaps(const EffectSetup& setup, const Eigen::Vector3d& bias_rad_s);
+  std::shared_ptr<const EffectSet> set() const { return set_; }
+  // `first`: column of the set's first parameter in the scores.
+  std::vector<StructureMap> Evaluate(const Scores& scores, int first,
+                                     const Eigen::VectorXd& prior_information) const;
+
+ private:
+  std::shared_ptr<EffectSet> set_;
+  std::vector<StructureMap> maps_;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_STRUCTURE_H_

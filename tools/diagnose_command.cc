@@ -1,0 +1,94 @@
+// `camgyro diagnose RECORDING --out DIR`: the closed loop.
+#include <gflags/gflags.h>
+
+#include <cstdio>
+
+#include "estimator/diagnosis/diagnose.h"
+#include "tools/commands.h"
+#include "tools/diagnosis_file.h"
+#include "tools/recording_input.h"
+#include "tools/result_files.h"
+#include "tools/summary.h"
+
+DECLARE_string(out);
+DECLARE_double(search_s);
+DECLARE_bool(quiet);
+DEFINE_double(significance, 0.01,
+              "probability of naming an effect where there is none, all candidates of a round "
+              "together");
+
+namespace camgyro {
+namespace {
+
+Status RunDiagnose(const std::vector<std::string>& arguments) {
+  DiagnoseOptions options;
+  if (!(FLAGS_search_s > 0.0)) return BadUsage("--search_s: expected a positive number");
+  if (!(FLAGS_significance > 0.0 && FLAGS_significance < 1.0)) {
+    return BadUsage("--significance: expected a number between 0 and 1");
+  }
+  options.calibrate.start.search_s = FLAGS_search_s;
+  options.significance = FLAGS_significance;
+  FileSet files(FLAGS_out.empty() ? "calibration" : FLAGS_out);
+  if (Status writable = files.CheckWritable(); !writable) return writable;
+  Result<Recording> recording = OpenRecording(arguments[0]);
+  if (!recording) return tl::unexpected(recording.error());
+  if (!FLAGS_quiet) {
+    std::printf("%s: %s\n%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),
+                Notes("input", recording->notes).c_str());
+    std::fflush(stdout);
+  }
+  Diagnosis diagnosis;
+  {
+    ProgressBar bar;
+    const Result<TrackingSummary> tracking = EnsureImageMotion(&bar, &*recording);
+    if (!tracking) return tl::unexpected(tracking.error());
+    diagnosis = Diagnose(*recording, RotationsFrom(*recording), options,
+                         [&](const std::string& stage, double done) { bar.Show(stage, done); });
+  }
+  const bool attitudes = HasOnlyAttitudes(*recording);
+  files.Add("diagnosis.yaml", DiagnosisYaml(diagnosis));
+  if (diagnosis.before) {
+    files.Add("calibration.yaml", CalibrationYaml(diagnosis.result(), attitudes));
+    files.Add("trace.csv", TraceCsv(diagnosis.result().trace));
+    files.Add("delay.csv", DelayCsv(diagnosis.result().start.curve));
+    files.Add("residual_maps.csv", ResidualMapsCsv(diagnosis));
+    if (diagnosis.after) {
+      files.Add("calibration_before.yaml", CalibrationYaml(*diagnosis.before, attitudes));
+    }
+  }
+  if (Status written = files.Write(); !written) return written;
+  if (diagnosis.before) {
+    std::printf("\n%s\n", ParameterTable(diagnosis.result().calibration, attitudes).c_str());
+  }
+  std::printf("%s", DiagnosisText(diagnosis, attitudes).c_str());
+  if (!FLAGS_quiet && diagnosis.before) {
+    std::printf("%s", Notes("doubt", diagnosis.result().doubts).c_str());
+  }
+  if (!FLAGS_quiet) {
+    std::printf(
+        "written    %s/diagnosis.yaml%s\n", files.folder().c_str(),
+        diagnosis.before ? ", calibration.yaml, residual_maps.csv, trace.csv, delay.csv" : "");
+  }
+  if (diagnosis.refusal) return Refusal(*recording, *diagnosis.refusal);
+  if (!diagnosis.not_tested.empty()) return CannotEstimate("diagnosis: " + diagnosis.not_tested);
+  return {};
+}
+
+}  // namespace
+
+Command DiagnoseCommand() {
+  Command command;
+  command.name = "diagnose";
+  command.arguments = "RECORDING";
+  command.summary =
+      "the closed loop: finds what the model lacks in frames that the fit has not seen, names the "
+      "effect, adds it, and reports the error before and after, into diagnosis.yaml (and "
+      "calibration.yaml with the effects, calibration_before.yaml without)";
+  command.flags = {"out", "significance"};
+  for (const std::string& name : GuessFlags()) command.flags.push_back(name);
+  command.flags.insert(command.flags.end(), {"search_s", "quiet"});
+  command.run = RunDiagnose;
+  return command;
+}
+
+}  // namespace camgyro

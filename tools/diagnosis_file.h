@@ -1,0 +1,22 @@
+// What `diagnose` writes and says.
+#ifndef CAMGYRO_TOOLS_DIAGNOSIS_FILE_H_
+#define CAMGYRO_TOOLS_DIAGNOSIS_FILE_H_
+
+#include <string>
+
+#include "estimator/diagnosis/diagnose.h"
+
+namespace camgyro {
+
+// diagnosis.yaml (design.md section 7).
+std::string DiagnosisYaml(const Diagnosis& diagnosis);
+
+// residual_maps.csv: every cell of every map, before and after the effects.
+std::string ResidualMapsCsv(const Diagnosis& diagnosis);
+
+// The account in the terminal: what was found, how sure, before and after, what to do.
+std::string DiagnosisText(const Diagnosis& diagnosis, bool attitudes);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_TOOLS_DIAGNOSIS_FILE_H_
