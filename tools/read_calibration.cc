@@ -190,15 +190,27 @@ Calibration Parse(const YAML::Node& root) {
   return c;
 }
 
+std::vector<std::string> ParseEffectNames(const YAML::Node& root) {
+  std::vector<std::string> names;
+  const YAML::Node effects = root.IsMap() ? root["effects"] : YAML::Node();
+  for (const YAML::Node& effect : effects) {
+    const YAML::Node name = effect.IsMap() ? effect["name"] : effect;
+    if (!name || !name.IsScalar()) {
+      throw Complaint{effect.Mark(), "effects: expected a list of {name: ...}"};
+    }
+    names.push_back(name.Scalar());
+  }
+  return names;
+}
+
 std::string Place(const std::string& path, const YAML::Mark& mark) {
   return mark.is_null() ? path : path + ":" + std::to_string(mark.line + 1);
 }
 
-}  // namespace
-
-Result<Calibration> ReadCalibration(const std::string& path) {
+template <typename T>
+Result<T> ParseFile(const std::string& path, T (*parse)(const YAML::Node& root)) {
   try {
-    return Parse(YAML::LoadFile(path));
+    return parse(YAML::LoadFile(path));
   } catch (const Complaint& complaint) {
     return BadInput(Place(path, complaint.mark) + ": " + complaint.text);
   } catch (const YAML::BadFile&) {
@@ -206,6 +218,14 @@ Result<Calibration> ReadCalibration(const std::string& path) {
   } catch (const YAML::Exception& error) {
     return BadInput(Place(path, error.mark) + ": not valid YAML: " + error.msg);
   }
+}
+
+}  // namespace
+
+Result<Calibration> ReadCalibration(const std::string& path) { return ParseFile(path, Parse); }
+
+Result<std::vector<std::string>> ReadEffectNames(const std::string& path) {
+  return ParseFile(path, ParseEffectNames);
 }
 
 }  // namespace camgyro

@@ -3,6 +3,7 @@
 #define CAMGYRO_TOOLS_READ_CALIBRATION_H_
 
 #include <string>
+#include <vector>
 
 #include "core/calibration.h"
 #include "core/result.h"
@@ -18,6 +19,9 @@ namespace camgyro {
 // Errors: kBadInput naming file, line and key: not YAML; wrong type, length or range; not finite (a
 // calibration from attitudes has no lens); an unknown distortion model.
 Result<Calibration> ReadCalibration(const std::string& path);
+
+// Names of the effects that the file lists. Errors as above.
+Result<std::vector<std::string>> ReadEffectNames(const std::string& path);
 
 }  // namespace camgyro
 
