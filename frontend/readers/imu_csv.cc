@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "frontend/readers/csv_reader.h"
-#include "frontend/readers/recording_checks.h"
+#include "frontend/readers/sample_rows.h"
 #include "frontend/readers/text.h"
 
 namespace camgyro {
@@ -39,17 +39,11 @@ Status ReadImuCsv(const std::string& file, Recording* recording) {
   }
   const double unit_rad = degree_columns == 3 ? kRadPerDeg : 1.0;
 
-  GyroCollector gyro(recording);
-  while (csv.NextRow()) {
-    const int64_t stamp_ns = csv.Stamp(0);
-    const Eigen::Vector3d rates(csv.Number(1), csv.Number(2), csv.Number(3));
-    std::optional<Eigen::Vector3d> accel;
-    if (csv.width() == 7) accel = Eigen::Vector3d(csv.Number(4), csv.Number(5), csv.Number(6));
-    if (!csv.status()) break;
-    if (const auto wrong = gyro.Add({stamp_ns, unit_rad * rates}, accel)) csv.Fail(*wrong);
-  }
-  if (!csv.status()) return csv.status();
-  if (Status whole = gyro.Finish(file); !whole) return whole;
+  SampleColumns columns;
+  columns.gyro = {1, 2, 3};
+  columns.gyro_map *= unit_rad;
+  if (csv.NextWidth() == 7) columns.accel = {4, 5, 6};
+  if (Status rows = ReadGyroRows(file, columns, &csv, recording); !rows) return rows;
   if (degree_columns == 3) {
     recording->notes.push_back(Concat(file, ": rates converted from deg/s to rad/s"));
   }
