@@ -9,6 +9,7 @@
 #include "frontend/readers/open_camera_reader.h"
 #include "frontend/readers/sensor_logger_reader.h"
 #include "frontend/readers/text.h"
+#include "frontend/readers/video_imu_capture_reader.h"
 
 namespace camgyro {
 namespace {
@@ -19,6 +20,7 @@ namespace fs = std::filesystem;
 Result<Recording> ReadAnyFolder(const std::string& folder) {
   const fs::path root(folder);
   if (fs::is_directory(root / "cam0") || fs::is_directory(root / "mav0")) return ReadFolder(folder);
+  if (IsVideoImuCapture(folder)) return ReadVideoImuCapture(folder);
   if (IsMarsLogger(folder)) return ReadMarsLogger(folder);
   if (IsSensorLogger(folder)) return ReadSensorLogger(folder);
   if (IsOpenCamera(folder)) return ReadOpenCamera(folder);
