@@ -7,6 +7,7 @@
 #include "frontend/readers/gopro_reader.h"
 #include "frontend/readers/mars_logger_reader.h"
 #include "frontend/readers/open_camera_reader.h"
+#include "frontend/readers/rosbag_reader.h"
 #include "frontend/readers/sensor_logger_reader.h"
 #include "frontend/readers/text.h"
 #include "frontend/readers/video_imu_capture_reader.h"
@@ -34,9 +35,10 @@ Result<Recording> ReadRecording(const std::string& path) {
     if (!fs::exists(path)) {
       return BadInput(Concat(path,
                              ": does not exist; expected a recording (docs/recording_format.md): a "
-                             "folder, a GoPro MP4 or a .gcsv"));
+                             "folder, a GoPro MP4, a .gcsv or a ROS bag"));
     }
     if (fs::is_directory(path)) return ReadAnyFolder(path);
+    if (IsRosbag(path)) return ReadRosbag(path);
     return IsGcsv(path) ? ReadGcsv(path) : ReadGoPro(path);
   } catch (const fs::filesystem_error& error) {  // of folders that may not be read
     return BadInput(Concat(path, ": ", error.code().message()));

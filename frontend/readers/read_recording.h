@@ -10,9 +10,9 @@
 namespace camgyro {
 
 // Reads a recording in any layout of docs/recording_format.md: a folder (EuRoC/ASL, with or without
-// mav0/), a GoPro MP4 with GPMF telemetry inside, a .gcsv with its video, or the folder of a logger
-// for phones. Images are not decoded here (see frame_source.h). Every complaint names the file, the
-// line, and what was expected there.
+// mav0/), a GoPro MP4 with GPMF telemetry inside, a .gcsv with its video, the folder of a logger
+// for phones, or a ROS bag. Images are not decoded here (see frame_source.h). Every complaint names
+// the file, the line, and what was expected there.
 Result<Recording> ReadRecording(const std::string& path);
 
 }  // namespace camgyro
