@@ -288,6 +288,33 @@ TEST_F(ExportTest, GyroflowPredictsTheMotionOfPoints) {
   EXPECT_LT(std::sqrt(sum_square_px / matches), 0.5);
 }
 
+// The log that was exported, read back beside its video, turns as the camera does.
+TEST_F(ExportTest, GyroflowLogIsReadBack) {
+  Simulate(
+      "duration_s: 0.3\nscene: {kind: room}\nmotion: {path_radius_m: 1}\n"
+      "camera: {resolution: [320, 240], focal_px: 290}\nvideo: {format: mp4}\n",
+      "a");
+  ASSERT_EQ(Run("export a/truth.yaml --format=gyroflow --out=. --recording=a").exit_code, 0);
+  std::filesystem::copy(Path("a/cam0/video.mp4"), Path("gyro.mp4"));
+  const Result<Recording> before = ReadRecording(Path("a"));
+  const Result<Recording> after = ReadRecording(Path("gyro.gcsv"));
+  const Result<Calibration> truth = ReadCalibration(Path("a/truth.yaml"));
+  ASSERT_TRUE(before && after && truth);
+  ASSERT_EQ(after->gyro.size(), before->gyro.size());
+  EXPECT_EQ(after->frames.size(), before->frames.size());
+  EXPECT_NEAR(*after->camera.readout_s, truth->readout_s, 1e-9);
+  Eigen::Matrix3d R_gyroflow_cam;
+  R_gyroflow_cam << 0, -1, 0, -1, 0, 0, 0, 0, -1;
+  for (size_t i = 0; i < before->gyro.size(); ++i) {
+    const Eigen::Vector3d w_cam =
+        truth->q_gyro_cam.conjugate() *
+        Eigen::Vector3d(before->gyro[i].omega_gyro_rad_s - truth->bias_gyro_rad_s);
+    EXPECT_LT((after->gyro[i].omega_gyro_rad_s - R_gyroflow_cam * w_cam).norm(), 1e-8);
+    EXPECT_NEAR(SecondsSince(0, after->gyro[i].stamp_ns),
+                SecondsSince(before->gyro[0].stamp_ns, before->gyro[i].stamp_ns), 1e-6);
+  }
+}
+
 TEST_F(ExportTest, ReversedReadout) {
   const std::string text = ReadFile(std::string(kGolden) + "calibration.yaml");
   std::string reversed = text;
