@@ -49,9 +49,15 @@ std::vector<std::string> Caveats(const ExportInput& input, const std::vector<std
     notes.push_back("not determined by the motion, and exported as they are: " +
                     Join(undetermined));
   }
-  if (!effects.empty()) {
-    notes.push_back("effects that this format does not hold: " + Join(effects));
+  // Those of the lens stand in the file's `camera` section, and so in the exports.
+  std::vector<std::string> lost;
+  for (const std::string& effect : effects) {
+    if (effect != "radial_distortion" && effect != "tangential_distortion" &&
+        effect != "aspect_ratio") {
+      lost.push_back(effect);
+    }
   }
+  if (!lost.empty()) notes.push_back("effects that this format does not hold: " + Join(lost));
   if (format == "gyroflow" && !input.recording) {
     notes.push_back(
         "no gyro.gcsv without --recording; the offset is then for a log whose times are the gyro's "
