@@ -26,7 +26,8 @@ configure_package_config_file(cmake/camgyroConfig.cmake.in ${PROJECT_BINARY_DIR}
                               INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/camgyroConfigVersion.cmake
                                  COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/camgyroConfig.cmake
+install(FILES ${PROJECT_SOURCE_DIR}/cmake/FindRosbagStorage.cmake
+              ${PROJECT_BINARY_DIR}/camgyroConfig.cmake
               ${PROJECT_BINARY_DIR}/camgyroConfigVersion.cmake
         DESTINATION ${package_dir})
 

@@ -97,7 +97,7 @@ struct Recording {
   std::vector<FramePair> matches;                 // pairwise matches without identity
   std::vector<std::vector<TrackedPoint>> tracks;  // one entry per frame, by ascending track id
   std::vector<Eigen::Quaterniond> q_cam_world;    // one per frame, world -> camera
-  std::string video_file;                         // frames of a container, in frames' order
+  std::string video_file;                         // frames of a video or bag, in frames' order
 
   MatchNoise match_noise = MatchNoise::kBothImages;
   // Set if a file says that the picture was stabilised electronically, with the file's own words.

@@ -4,6 +4,7 @@
 
 #include "frontend/readers/ffmpeg.h"
 #include "frontend/readers/image_file.h"
+#include "frontend/readers/rosbag_reader.h"
 #include "frontend/readers/text.h"
 #include "frontend/readers/video_container.h"
 
@@ -142,6 +143,7 @@ Result<std::unique_ptr<FrameSource>> OpenFrames(const Recording& recording) {
     return BadInput(Concat(recording.path, ": has no pictures, expected images or a video"));
   }
   if (recording.video_file.empty()) return std::make_unique<ImageFrames>(recording);
+  if (IsRosbag(recording.video_file)) return OpenRosbagFrames(recording);
   auto frames = std::make_unique<VideoFrames>(recording);
   if (Status status = frames->Open(); !status) return tl::unexpected(status.error());
   return frames;

@@ -14,6 +14,7 @@ Command DiagnoseCommand();
 Command DelayCommand();
 Command TrackCommand();
 Command SimulateCommand();
+Command ExportCommand();
 Command HelpCommand();
 
 // All of them, in the order of the help.

@@ -10,8 +10,15 @@ constexpr size_t kUsageWidth = 40;  // the longest is simulate's
 }  // namespace
 
 std::vector<Command> AllCommands() {
-  return {CalibrateCommand(), DiagnoseCommand(), DelayCommand(),
-          TrackCommand(),     SimulateCommand(), HelpCommand()};
+  return {
+      CalibrateCommand(),  //
+      DiagnoseCommand(),   //
+      DelayCommand(),      //
+      TrackCommand(),      //
+      SimulateCommand(),   //
+      ExportCommand(),     //
+      HelpCommand(),
+  };
 }
 
 Result<Command> FindCommand(const std::string& name) {
@@ -35,9 +42,9 @@ std::string ProgramHelp() {
     help += command.summary.substr(0, command.summary.find(':')) + "\n";
   }
   help +=
-      "\n`camgyro help COMMAND` lists its flags. A recording is a folder "
-      "(docs/recording_format.md)\n"
-      "or a GoPro MP4. Exit codes: 0 done; 2 bad usage; 3 bad input; 4 could not estimate.\n";
+      "\n`camgyro help COMMAND` lists its flags. A recording is a folder, ours or of an app for\n"
+      "phones, a GoPro MP4, a .gcsv or a ROS bag (docs/recording_format.md). Exit codes: 0 done;\n"
+      "2 bad usage; 3 bad input; 4 could not estimate.\n";
   return help;
 }
 

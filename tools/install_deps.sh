@@ -9,7 +9,9 @@ packages=(
   # libraries
   libeigen3-dev libceres-dev libsuitesparse-dev libgflags-dev libgoogle-glog-dev
   libopencv-dev libavformat-dev libavcodec-dev libswscale-dev libavutil-dev
-  libyaml-cpp-dev libexpected-dev libfast-float-dev
+  libyaml-cpp-dev nlohmann-json3-dev libexpected-dev libfast-float-dev
+  # optional: recordings of VideoIMUCapture
+  libprotobuf-dev protobuf-compiler
   # tests
   libgmock-dev libgtest-dev
   # tools/measure.py

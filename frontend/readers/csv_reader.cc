@@ -27,9 +27,7 @@ bool IsNumber(std::string_view cell) {
 
 }  // namespace
 
-CsvReader::CsvReader(const std::string& file, std::vector<std::string> columns,
-                     std::vector<size_t> widths)
-    : file_(file), columns_(std::move(columns)), widths_(std::move(widths)) {
+CsvReader::CsvReader(const std::string& file) : file_(file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     status_ = BadInput(Concat(file, ": cannot be opened for reading"));
@@ -37,7 +35,13 @@ CsvReader::CsvReader(const std::string& file, std::vector<std::string> columns,
   }
   content_.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
   if (content_.compare(0, 3, "\xEF\xBB\xBF") == 0) position_ = 3;
+}
 
+CsvReader::CsvReader(const std::string& file, std::vector<std::string> columns,
+                     std::vector<size_t> widths)
+    : CsvReader(file) {
+  columns_ = std::move(columns);
+  widths_ = std::move(widths);
   const size_t begin = position_;
   std::string_view text;
   if (!NextLine(&text)) return;
@@ -52,6 +56,56 @@ CsvReader::CsvReader(const std::string& file, std::vector<std::string> columns,
   }
 }
 
+CsvReader CsvReader::ByName(const std::string& file, int skip_lines) {
+  CsvReader csv(file);
+  std::string_view text;
+  while (csv.line_ < skip_lines && csv.position_ < csv.content_.size()) {
+    csv.position_ = std::min(csv.content_.find('\n', csv.position_), csv.content_.size()) + 1;
+    ++csv.line_;
+  }
+  for (;;) {
+    const size_t begin = csv.position_;
+    const int line = csv.line_;
+    if (!csv.NextLine(&text)) break;
+    const bool marked = text.front() == '#';
+    if (marked) text.remove_prefix(1);
+    Split(text, &csv.cells_);
+    const bool numbers = std::any_of(csv.cells_.begin(), csv.cells_.end(), IsNumber);
+    if (marked || !numbers) csv.header_.assign(csv.cells_.begin(), csv.cells_.end());
+    if (marked) continue;
+    if (numbers) {
+      csv.position_ = begin;
+      csv.line_ = line;
+    }
+    break;
+  }
+  if (csv.header_.empty()) {
+    if (csv.status_) csv.status_ = BadInput(Concat(file, ": expected a header of column names"));
+    return csv;
+  }
+  csv.columns_ = csv.header_;
+  csv.widths_ = {csv.header_.size()};
+  return csv;
+}
+
+size_t CsvReader::Column(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    const auto found = std::find(header_.begin(), header_.end(), name);
+    if (found != header_.end()) return static_cast<size_t>(found - header_.begin());
+  }
+  if (status_) {
+    std::string found, expected;
+    for (const std::string& name : header_) found += (found.empty() ? "" : ",") + name;
+    for (const std::string& name : names) expected += (expected.empty() ? "" : " or ") + name;
+    status_ = BadInput(Concat(file_, ": the header is ", found, ", expected a column ", expected));
+  }
+  return 0;
+}
+
+bool CsvReader::HasColumn(const std::string& name) const {
+  return std::find(header_.begin(), header_.end(), name) != header_.end();
+}
+
 bool CsvReader::NextLine(std::string_view* text) {
   while (position_ < content_.size()) {
     const size_t end = std::min(content_.find('\n', position_), content_.size());
@@ -61,6 +115,20 @@ bool CsvReader::NextLine(std::string_view* text) {
     if (!text->empty()) return true;
   }
   return false;
+}
+
+size_t CsvReader::NextWidth() {
+  const size_t position = position_;
+  const int line = line_;
+  std::string_view text;
+  size_t next_width = 0;
+  while (status_ && next_width == 0 && NextLine(&text)) {
+    if (text.front() == '#') continue;
+    next_width = static_cast<size_t>(std::count(text.begin(), text.end(), ',')) + 1;
+  }
+  position_ = position;
+  line_ = line;
+  return next_width;
 }
 
 bool CsvReader::NextRow() {
@@ -90,6 +158,22 @@ int64_t CsvReader::Integer(size_t column, const char* expected) {
   int64_t value = 0;
   if (!ParseNumber(cells_[column], &value)) FailCell(column, expected);
   return value;
+}
+
+int64_t CsvReader::Time(size_t column, double unit_s) {
+  constexpr double kLargestNs = 9.2e18;  // of int64_t, 292 years
+  const double unit_ns = unit_s * 1e9, whole_ns = std::round(unit_ns);
+  int64_t whole = 0;
+  if (whole_ns == 1.0) return Stamp(column);
+  const double value = Number(column);
+  if (!(std::abs(value) * unit_ns < kLargestNs)) {
+    FailCell(column, "a time below 292 years");
+    return 0;
+  }
+  if (std::abs(unit_ns - whole_ns) < 1e-9 * unit_ns && ParseNumber(cells_[column], &whole)) {
+    return whole * static_cast<int64_t>(whole_ns);
+  }
+  return std::llround(value * unit_ns);
 }
 
 double CsvReader::Number(size_t column) {

@@ -26,16 +26,28 @@ class CsvReader {
   // all rows of a file have the width of its first row.
   CsvReader(const std::string& file, std::vector<std::string> columns, std::vector<size_t> widths);
 
+  // A file whose columns go by the names in its header: the first line in which no cell is a
+  // number, or a line with '#' before the first row of numbers. skip_lines: of another kind, before
+  // it. Rows have the header's width.
+  static CsvReader ByName(const std::string& file, int skip_lines = 0);
+
+  // Of ByName: the index of the column with one of these names; an error and 0 if there is none.
+  size_t Column(const std::vector<std::string>& names);
+  bool HasColumn(const std::string& name) const;
+
   // Cell names of the header (without '#'); empty without one. Known before the first NextRow().
   const std::vector<std::string>& header() const { return header_; }
 
   bool NextRow();
+  size_t NextWidth();  // cells of the row that NextRow() will find; 0 at the end
   size_t width() const { return cells_.size(); }
   int line() const { return line_; }  // of the current row, from 1
 
   std::string_view Cell(size_t column) const { return cells_[column]; }
   int64_t Stamp(size_t column) { return Integer(column, "an integer number of nanoseconds"); }
   int64_t Integer(size_t column, const char* expected = "an integer");
+  // A time in units of `unit_s` as nanoseconds; exact if it is written as an integer.
+  int64_t Time(size_t column, double unit_s);
   double Number(size_t column);  // finite
 
   // Records an error of the current row; the file and the line are put in front.
@@ -43,6 +55,7 @@ class CsvReader {
   const Status& status() const { return status_; }
 
  private:
+  explicit CsvReader(const std::string& file);  // reads the content only
   bool NextLine(std::string_view* text);
   void FailCell(size_t column, const std::string& expected);
 

@@ -7,12 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/readers/add_pictures.h"
 #include "frontend/readers/camera_csv.h"
 #include "frontend/readers/image_file.h"
 #include "frontend/readers/imu_csv.h"
+#include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sensor_yaml.h"
 #include "frontend/readers/text.h"
-#include "frontend/readers/video_container.h"
 
 namespace camgyro {
 namespace {
@@ -33,19 +34,6 @@ CameraFiles FindCameraFiles(const fs::path& cam) {
           (cam / "sensor.yaml").string()};
 }
 
-// Takes the size that the pictures have, or refuses if sensor.yaml says another.
-Status SetResolution(int width_px, int height_px, const std::string& file,
-                     const std::string& yaml_file, CameraGuess* camera) {
-  if (camera->width_px != 0 && (camera->width_px != width_px || camera->height_px != height_px)) {
-    return BadInput(Concat(file, ": the picture has ", width_px, " x ", height_px, " pixels, but ",
-                           yaml_file, " says resolution [", camera->width_px, ", ",
-                           camera->height_px, "]; expected the same"));
-  }
-  camera->width_px = width_px;
-  camera->height_px = height_px;
-  return {};
-}
-
 Status AddImages(const CameraFiles& files, const FrameTable& table, Recording* recording) {
   for (size_t i = 0; i < table.frames.size(); ++i) {
     const std::string image = (fs::path(files.images) / table.frames[i].image_file).string();
@@ -59,30 +47,6 @@ Status AddImages(const CameraFiles& files, const FrameTable& table, Recording* r
   const Result<cv::Mat> image = ReadGrayImage(first);
   if (!image) return tl::unexpected(image.error());
   return SetResolution(image->cols, image->rows, first, files.yaml, &recording->camera);
-}
-
-Status AddVideo(const CameraFiles& files, Recording* recording) {
-  const Result<VideoContainer> video = ReadVideoContainer(files.video);
-  if (!video) return tl::unexpected(video.error());
-  if (recording->frames.empty()) {
-    for (const int64_t stamp_ns : video->stamps_ns) {
-      recording->frames.emplace_back().stamp_ns = stamp_ns;
-    }
-    recording->notes.push_back(
-        Concat(files.video, ": frame stamps are the container's, as there is no cam0/data.csv"));
-  } else if (recording->frames.size() != video->stamps_ns.size()) {
-    return BadInput(Concat(files.data, ": has ", recording->frames.size(), " frames, but ",
-                           files.video, " has ", video->stamps_ns.size(),
-                           "; expected the same number"));
-  }
-  recording->video_file = files.video;
-  if (video->display_rotation_deg != 0) {
-    recording->notes.push_back(
-        Concat(files.video, ": is to be shown rotated by ", video->display_rotation_deg,
-               " deg clockwise; rows are read out as coded, so it is used without that rotation"));
-  }
-  return SetResolution(video->width_px, video->height_px, files.video, files.yaml,
-                       &recording->camera);
 }
 
 // Frames for tracks, matches or attitudes that come without cam0/data.csv.
@@ -137,7 +101,13 @@ Status ReadCamera(const fs::path& cam, Recording* recording) {
   if (has_images) {
     if (Status status = AddImages(files, table, recording); !status) return status;
   } else if (!files.video.empty()) {
-    if (Status status = AddVideo(files, recording); !status) return status;
+    if (table.frames.empty()) {
+      recording->notes.push_back(
+          Concat(files.video, ": frame stamps are the container's, as there is no cam0/data.csv"));
+    }
+    if (Status status = AddVideo(files.video, files.data, files.yaml, recording); !status) {
+      return status;
+    }
   } else if (!has_tables) {
     return BadInput(Concat(cam.string(),
                            ": nothing to calibrate with; expected file names in data.csv and the "
@@ -145,15 +115,7 @@ Status ReadCamera(const fs::path& cam, Recording* recording) {
   } else if (table.frames.empty()) {
     if (Status status = AddFramesOfTables(files, recording); !status) return status;
   }
-  if (recording->frames.size() < 2) {
-    return BadInput(
-        Concat(cam.string(), ": has ", recording->frames.size(), " frames, expected at least two"));
-  }
-  if (MedianInterval(recording->frames) < 1e-5) {
-    return BadInput(Concat(cam.string(), ": the median interval of frame stamps is ",
-                           MedianInterval(recording->frames) * 1e9,
-                           " ns, too short for any camera; expected stamps in nanoseconds"));
-  }
+  if (Status frames = CheckFrames(cam.string(), recording->frames); !frames) return frames;
   NoteRate(cam, yaml->rate_hz, MedianInterval(recording->frames), recording);
   if (recording->camera.width_px == 0 && (!files.tracks.empty() || !files.matches.empty())) {
     return BadInput(Concat(files.tracks.empty() ? files.matches : files.tracks,
@@ -180,19 +142,6 @@ Status ReadImu(const fs::path& imu, Recording* recording) {
   Status status = ReadImuCsv((imu / "data.csv").string(), recording);
   if (status) NoteRate(imu, yaml->rate_hz, MedianInterval(recording->gyro), recording);
   return status;
-}
-
-// A note if the stamps do not overlap: clocks may have different origins, which the delay search
-// has to bridge.
-void NoteClocks(Recording* recording) {
-  const int64_t cam_first = recording->frames.front().stamp_ns;
-  const int64_t cam_last = recording->frames.back().stamp_ns;
-  const int64_t gyro_first = recording->gyro.front().stamp_ns;
-  const int64_t gyro_last = recording->gyro.back().stamp_ns;
-  if (cam_first <= gyro_last && gyro_first <= cam_last) return;
-  recording->notes.push_back(Concat("camera and gyro clocks do not overlap: frames from ",
-                                    cam_first, " to ", cam_last, " ns, gyro from ", gyro_first,
-                                    " to ", gyro_last, " ns"));
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 
 #include "core/time.h"
 #include "frontend/readers/gpmf.h"
-#include "frontend/readers/imu_csv.h"
 #include "frontend/readers/mp4_box.h"
+#include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sample_clock.h"
 #include "frontend/readers/text.h"
 #include "frontend/readers/video_container.h"

@@ -15,10 +15,6 @@ namespace camgyro {
 // than two samples, stamps that cannot be nanoseconds.
 Status ReadImuCsv(const std::string& file, Recording* recording);
 
-// Error if the 99th percentile of |w| is beyond the full scale of gyros, 2000 deg/s: the rates are
-// in deg/s then. Slow motion in deg/s passes; only the camera can tell there.
-Status CheckRateUnit(const std::string& file, const std::vector<GyroSample>& gyro);
-
 }  // namespace camgyro
 
 #endif  // CAMGYRO_FRONTEND_READERS_IMU_CSV_H_

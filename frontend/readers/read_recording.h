@@ -9,9 +9,10 @@
 
 namespace camgyro {
 
-// Reads a recording: a folder in the layout of docs/recording_format.md (EuRoC/ASL, with or
-// without mav0/), or a GoPro MP4 with GPMF telemetry inside. Images are not decoded here (see
-// frame_source.h). Every complaint names the file, the line, and what was expected there.
+// Reads a recording in any layout of docs/recording_format.md: a folder (EuRoC/ASL, with or without
+// mav0/), a GoPro MP4 with GPMF telemetry inside, a .gcsv with its video, the folder of a logger
+// for phones, or a ROS bag. Images are not decoded here (see frame_source.h). Every complaint names
+// the file, the line, and what was expected there.
 Result<Recording> ReadRecording(const std::string& path);
 
 }  // namespace camgyro
