@@ -14,8 +14,8 @@ packages=(
   libprotobuf-dev protobuf-compiler
   # tests
   libgmock-dev libgtest-dev
-  # tools/measure.py
-  python3
+  # tools/measure*.py
+  python3 python3-yaml
 )
 
 missing=()
