@@ -13,7 +13,7 @@
 
 DEFINE_string(out, "",
               "folder to write into, made if absent; without: ./calibration (calibrate), the "
-              "recording (track), no files (delay)");
+              "recording (track), no files (delay, compare)");
 DEFINE_string(estimator, "window",
               "online estimator: window, or ekf, the filter of the paper, without refinement");
 DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");

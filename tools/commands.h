@@ -10,6 +10,7 @@
 namespace camgyro {
 
 Command CalibrateCommand();
+Command CompareCommand();
 Command DelayCommand();
 Command TrackCommand();
 Command SimulateCommand();
