@@ -122,9 +122,7 @@ Result<std::string> RunSeed(const Plan& plan, const Case& from, uint64_t seed) {
   const Result<Input> input = comparison::MakeInput(from, seed, *start);
   if (!input) return tl::unexpected(input.error());
   SeedRun run;
-  for (const std::string& name : plan.estimators) {
-    run.estimators.push_back(comparison::RunEstimator(name, *input, plan.ekf));
-  }
+  run.estimators = comparison::RunEstimators(plan.estimators, *input, plan.ekf);
   if (from.scenario) {
     run.bound = comparison::InformationBound(
         input->exact_matches, input->recording, input->truth, input->prior.prior_sigma,

@@ -11,7 +11,7 @@ packages=(
   libopencv-dev libavformat-dev libavcodec-dev libswscale-dev libavutil-dev
   libyaml-cpp-dev libexpected-dev libfast-float-dev
   # tests
-  libgmock-dev libgtest-dev
+  libgmock-dev libgtest-dev libbenchmark-dev
   # tools/measure.py
   python3
 )

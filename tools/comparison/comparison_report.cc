@@ -4,25 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <sstream>
 
+#include "tools/comparison/format.h"
 #include "tools/comparison/parameter_units.h"
 
 namespace camgyro::comparison {
 namespace {
 
 constexpr int kDigits = 10;
-
-__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
-  char text[400];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
 
 // Right-aligned with three digits; a dash for what is not known.
 std::string Cell(double value, int width) {

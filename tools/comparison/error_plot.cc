@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <utility>
 #include <vector>
 
+#include "tools/comparison/format.h"
 #include "tools/comparison/parameter_units.h"
 
 namespace camgyro::comparison {
@@ -17,15 +16,6 @@ constexpr double kPanelWidth = 290, kPanelHeight = 190;             // with its 
 constexpr double kLeft = 52, kTop = 30, kRight = 14, kBottom = 30;  // of a panel, around its axes
 constexpr double kTitleHeight = 34;
 constexpr size_t kMaxPoints = 400;  // of a line
-
-__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
-  char text[500];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
 
 const char* ColorOf(const std::string& estimator) {
   if (estimator == "ekf") return "#c2410c";
@@ -83,7 +73,7 @@ class Panel {
         "stroke=\"#9ca3af\"/>\n",
         left_, top_, width_, height_);
     svg += TextAt(left_, top_ - 8, "font-size=\"12\"", Label(unit.label) + " [" + unit.unit + "]");
-    double last_y = 1e9;  // of the label above
+    double labelled_y = 1e9;  // of the last label above zero; those below mirror it
     std::vector<double> ticks = {0.0};
     const double first = std::pow(10.0, std::floor(std::log10(0.5 * linear_)) + 1.0);
     for (double power = first; power < largest_; power *= 10.0) {
@@ -92,17 +82,18 @@ class Panel {
       }
     }
     for (const double tick : ticks) {
+      const bool labelled = labelled_y - Y(tick) >= 11.0;
+      if (labelled) labelled_y = Y(tick);
       for (const double value : {tick, -tick}) {
         svg += Format(
             "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"%s\" "
             "stroke-width=\"%s\"/>\n",
             left_, left_ + width_, Y(value), Y(value), tick == 0.0 ? "#6b7280" : "#e5e7eb",
             tick == 0.0 ? "0.8" : "0.6");
-        if (value >= 0.0 && last_y - Y(value) < 11.0) continue;
-        if (value < 0.0 && last_y == 1e9) continue;
-        if (value >= 0.0) last_y = Y(value);
-        svg += TextAt(left_ - 5, Y(value) + 3.5, "font-size=\"10\" text-anchor=\"end\"",
-                      Format("%s%g", value < 0.0 ? "−" : "", std::abs(value)));
+        if (labelled) {
+          svg += TextAt(left_ - 5, Y(value) + 3.5, "font-size=\"10\" text-anchor=\"end\"",
+                        Format("%s%g", value < 0.0 ? "−" : "", std::abs(value)));
+        }
         if (tick == 0.0) break;
       }
     }

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "estimator/window/refinement.h"
@@ -102,6 +103,25 @@ void TakeTrace(const std::vector<WindowUpdate>& trace, const Input& input, Estim
   }
 }
 
+void RunRefinement(const Input& input, const EstimationInput& data,
+                   const std::vector<WindowUpdate>& window_trace, EstimatorRun* run) {
+  RefinementOptions options;
+  options.graph = GraphOptions(input);
+  Calibration from = input.start;
+  if (!window_trace.empty()) {
+    from = window_trace.back().estimate;
+    options.graph.sigma_px = window_trace.back().noise_px;
+  }
+  from.prior_sigma = input.prior.prior_sigma;
+  std::optional<Result<Refined>> refined;
+  Measure([&] { refined = Refine(data, data.pairs, from, input.prior, options); }, run);
+  if (*refined) {
+    TakeResult((*refined)->calibration, input, run);
+  } else {
+    run->failure = refined->error().message;
+  }
+}
+
 }  // namespace
 
 const std::vector<std::string>& EstimatorNames() {
@@ -109,41 +129,39 @@ const std::vector<std::string>& EstimatorNames() {
   return names;
 }
 
-EstimatorRun RunEstimator(const std::string& name, const Input& input, const EkfOptions& ekf) {
-  EstimatorRun run;
-  run.estimator = name;
-  run.frames = static_cast<int>(input.recording.frames.size());
+std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, const Input& input,
+                                        const EkfOptions& ekf) {
   const EstimationInput data = MakeEstimationInput(input.recording);
-  if (name == "ekf") {
-    Calibration start = input.start;
-    start.prior_sigma = input.prior.prior_sigma;
-    EkfRun result;
-    Measure([&] { result = RunEkf(data, input.recording.frames, start, ekf); }, &run);
-    TakeTrace(result.trace, input, &run);
-    return run;
+  std::vector<EstimatorRun> runs;
+  // The window's, also for the refinement, which begins where it ends.
+  std::optional<EstimatorRun> window;
+  std::vector<WindowUpdate> window_trace;
+  const auto run_window = [&] {
+    if (window) return;
+    window.emplace();
+    Measure([&] { window_trace = RunWindow(input, data); }, &*window);
+    TakeTrace(window_trace, input, &*window);
+  };
+  for (const std::string& name : names) {
+    EstimatorRun run;
+    if (name == "ekf") {
+      Calibration start = input.start;
+      start.prior_sigma = input.prior.prior_sigma;
+      EkfRun result;
+      Measure([&] { result = RunEkf(data, input.recording.frames, start, ekf); }, &run);
+      TakeTrace(result.trace, input, &run);
+    } else if (name == "window") {
+      run_window();
+      run = *window;
+    } else {
+      run_window();
+      RunRefinement(input, data, window_trace, &run);
+    }
+    run.estimator = name;
+    run.frames = static_cast<int>(input.recording.frames.size());
+    runs.push_back(std::move(run));
   }
-  std::vector<WindowUpdate> trace;
-  Measure([&] { trace = RunWindow(input, data); }, &run);
-  if (name == "window") {
-    TakeTrace(trace, input, &run);
-    return run;
-  }
-  RefinementOptions options;
-  options.graph = GraphOptions(input);
-  Calibration from = input.start;
-  if (!trace.empty()) {
-    from = trace.back().estimate;
-    options.graph.sigma_px = trace.back().noise_px;
-  }
-  from.prior_sigma = input.prior.prior_sigma;
-  std::optional<Result<Refined>> refined;
-  Measure([&] { refined = Refine(data, data.pairs, from, input.prior, options); }, &run);
-  if (*refined) {
-    TakeResult((*refined)->calibration, input, &run);
-  } else {
-    run.failure = refined->error().message;
-  }
-  return run;
+  return runs;
 }
 
 namespace {

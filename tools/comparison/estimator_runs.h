@@ -32,8 +32,9 @@ struct EstimatorRun {
   double memory_mb = 0.0;  // peak above what the process held before; 0 where /proc cannot tell
 };
 
-// name: one of EstimatorNames(). The filter is told `ekf` as it is.
-EstimatorRun RunEstimator(const std::string& name, const Input& input, const EkfOptions& ekf);
+// names: of EstimatorNames(). The filter is told `ekf` as it is.
+std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, const Input& input,
+                                        const EkfOptions& ekf);
 
 // A run of one seed: every estimator and the bound (scenarios only; one entry per pair of frames).
 struct SeedRun {
