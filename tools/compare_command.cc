@@ -190,12 +190,13 @@ Status RunCompare(const std::vector<std::string>& arguments) {
                                        result.runs.front()));
   }
   if (FLAGS_out.empty()) return {};
+  files.Add("compare.md", comparison::ComparisonMarkdown(*results));
   files.Add("compare.yaml", comparison::ComparisonYaml(*results));
   files.Add("runs.csv", comparison::RunsCsv(*results));
   files.Add("traces.csv", comparison::TracesCsv(*results));
   if (Status written = files.Write(); !written) return written;
   if (!FLAGS_quiet) {
-    std::printf("\nwritten    %s/compare.yaml, runs.csv, traces.csv, errors_*.svg\n",
+    std::printf("\nwritten    %s/compare.md, compare.yaml, runs.csv, traces.csv, errors_*.svg\n",
                 files.folder().c_str());
   }
   return {};

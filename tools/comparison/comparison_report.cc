@@ -22,14 +22,33 @@ std::string Cell(double value, int width) {
   return Format("%*.*f", width, decimals, value);
 }
 
-std::string HeadLine(const EstimatorStatistics& s) {
+// "walking: 8 runs, 301 frames, noise 0.5 px".
+std::string Headline(const CaseResult& result) {
+  const auto count = static_cast<int>(result.runs.size());
+  int frames = 0;
+  for (const SeedRun& run : result.runs) {
+    for (const EstimatorRun& e : run.estimators) frames = std::max(frames, e.frames);
+  }
+  std::string text =
+      Format("%s: %d run%s, %d frames", result.name.c_str(), count, count == 1 ? "" : "s", frames);
+  if (result.noise_px > 0.0) text += Format(", noise %g px", result.noise_px);
+  return text;
+}
+
+// "1.05 [0.81, 1.32]".
+std::string NeesText(const EstimatorStatistics& s) {
+  std::string text = Cell(s.nees, 0);
+  if (std::isfinite(s.nees_low)) {
+    text += " [" + Cell(s.nees_low, 0) + ", " + Cell(s.nees_high, 0) + "]";
+  }
+  return text;
+}
+
+std::string EstimatorLine(const EstimatorStatistics& s) {
   std::string line = Format("  %-11s", s.estimator.c_str());
   if (s.runs > 0) {
-    line += "NEES/dof " + Cell(s.nees, 0);
-    if (std::isfinite(s.nees_low)) {
-      line += " [" + Cell(s.nees_low, 0) + ", " + Cell(s.nees_high, 0) + "]";
-    }
-    line += Format(", %.0f %% within 3 sigma, ", 100.0 * s.within_3_sigma) +
+    line += "NEES/dof " + NeesText(s) +
+            Format(", %.0f %% within 3 sigma, ", 100.0 * s.within_3_sigma) +
             Cell(s.ms_per_frame, 0) + " ms per frame, " + Cell(s.memory_mb, 0) + " MB";
   }
   if (s.failed > 0) line += Format("%s%d failed", s.runs > 0 ? ", " : "", s.failed);
@@ -81,17 +100,9 @@ std::string Header(const char* prefix) {
 }  // namespace
 
 std::string CaseTable(const CaseResult& result) {
-  const auto count = static_cast<int>(result.runs.size());
-  int frames = 0;
-  for (const SeedRun& run : result.runs) {
-    for (const EstimatorRun& e : run.estimators) frames = std::max(frames, e.frames);
-  }
-  std::string text =
-      Format("%s: %d run%s, %d frames", result.name.c_str(), count, count == 1 ? "" : "s", frames);
-  if (result.noise_px > 0.0) text += Format(", noise %g px", result.noise_px);
-  text += "\n";
+  std::string text = Headline(result) + "\n";
   for (const EstimatorStatistics& s : result.statistics) {
-    text += HeadLine(s);
+    text += EstimatorLine(s);
     if (s.runs == 0) continue;
     text += Format("    %-12s%9s%9s%9s%9s%9s%9s%9s\n", "", "RMSE", "bound", "/ bound", "sigma",
                    "bias", "in 3 s", "frames");
@@ -105,6 +116,49 @@ std::string CaseTable(const CaseResult& result) {
               (std::isfinite(p.frames_to_converge) ? Format("%9.0f\n", p.frames_to_converge)
                                                    : Format("%9s\n", "-"));
     }
+  }
+  return text;
+}
+
+std::string ComparisonMarkdown(const std::vector<CaseResult>& results) {
+  std::string text;
+  for (const CaseResult& result : results) {
+    text += "### " + Headline(result) + "\n\n";
+    text +=
+        "| | NEES/dof | Within 3 sigma | CPU per frame [ms] | Memory [MB] | Failed |\n"
+        "| --- | --- | --- | --- | --- | --- |\n";
+    std::string heads = "| RMSE (/ bound; bias / sigma; frames) | bound |";
+    std::string rules = "| --- | --- |";
+    for (const EstimatorStatistics& s : result.statistics) {
+      heads += " " + s.estimator + " |";
+      rules += " --- |";
+      text += "| " + s.estimator + " |";
+      if (s.runs > 0) {
+        text += " " + NeesText(s) + Format(" | %.0f %% | ", 100.0 * s.within_3_sigma) +
+                Cell(s.ms_per_frame, 0) + " | " + Cell(s.memory_mb, 0) + " |";
+      } else {
+        text += " - | - | - | - |";
+      }
+      text += Format(" %d |\n", s.failed);
+    }
+    text += "\n" + heads + "\n" + rules + "\n";
+    for (size_t i = 0; i < kStateSize; ++i) {
+      const ParameterUnit& unit = ParameterUnits()[i];
+      const double bound = unit.scale * result.statistics.front().parameters[i].bound;
+      text += Format("| %s [%s] | ", unit.label, unit.unit) + Cell(bound, 0) + " |";
+      for (const EstimatorStatistics& s : result.statistics) {
+        const ParameterStatistics& p = s.parameters[i];
+        text += s.runs == 0 ? std::string(" - |")
+                            : " " + Cell(unit.scale * p.rmse, 0) + " (" +
+                                  Cell(p.rmse / p.bound, 0) + "; " + Cell(p.bias_sigmas, 0) + "; " +
+                                  (std::isfinite(p.frames_to_converge)
+                                       ? Format("%.0f", p.frames_to_converge)
+                                       : std::string("-")) +
+                                  ") |";
+      }
+      text += "\n";
+    }
+    text += "\n";
   }
   return text;
 }

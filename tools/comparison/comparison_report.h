@@ -19,6 +19,9 @@ struct CaseResult {
 // The tables of a case for the terminal.
 std::string CaseTable(const CaseResult& result);
 
+// The same as Markdown, for documents: one table of cost and honesty, one of errors.
+std::string ComparisonMarkdown(const std::vector<CaseResult>& results);
+
 // compare.yaml: the same numbers for programs; px, s, rad/s, rad.
 std::string ComparisonYaml(const std::vector<CaseResult>& results);
 

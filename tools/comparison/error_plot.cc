@@ -15,7 +15,7 @@ constexpr int kColumns = 4, kRows = 3;
 constexpr double kPanelWidth = 290, kPanelHeight = 190;             // with its labels
 constexpr double kLeft = 52, kTop = 30, kRight = 14, kBottom = 30;  // of a panel, around its axes
 constexpr double kTitleHeight = 34;
-constexpr size_t kMaxPoints = 400;  // of a line
+constexpr size_t kMaxPoints = 250;  // of a line
 
 const char* ColorOf(const std::string& estimator) {
   if (estimator == "ekf") return "#c2410c";
