@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "estimator/calibrate.h"
+#include "estimator/reference/calibrate_with_ekf.h"
 #include "tools/commands.h"
 #include "tools/recording_input.h"
 #include "tools/result_files.h"
@@ -12,8 +13,9 @@
 
 DEFINE_string(out, "",
               "folder to write into, made if absent; without: ./calibration (calibrate), the "
-              "recording (track), no files (delay)");
-DEFINE_string(estimator, "window", "online estimator: window");
+              "recording (track), no files (delay, compare)");
+DEFINE_string(estimator, "window",
+              "online estimator: window, or ekf, the filter of the paper, without refinement");
 DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");
 DEFINE_bool(refine, true,
             "skip the last step, all frames in one problem: the online estimate is the result");
@@ -28,8 +30,8 @@ namespace {
 
 Result<CalibrateOptions> OptionsFromFlags() {
   CalibrateOptions options;
-  if (FLAGS_estimator != "window") {
-    return BadUsage("--estimator=" + FLAGS_estimator + ": expected window");
+  if (FLAGS_estimator != "window" && FLAGS_estimator != "ekf") {
+    return BadUsage("--estimator=" + FLAGS_estimator + ": expected window or ekf");
   }
   if (FLAGS_residual == "determinant") {
     options.residual = ResidualKind::kDeterminant;
@@ -62,9 +64,13 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
     ProgressBar bar;
     tracking = EnsureImageMotion(&bar, &*recording);
     if (!tracking) return tl::unexpected(tracking.error());
-    report =
-        CalibrateRecording(*recording, RotationsFrom(*recording), *options,
-                           [&](const std::string& stage, double done) { bar.Show(stage, done); });
+    if (FLAGS_estimator == "ekf") {
+      report = CalibrateWithEkf(*recording, RotationsFrom(*recording), *options, {});
+    } else {
+      report =
+          CalibrateRecording(*recording, RotationsFrom(*recording), *options,
+                             [&](const std::string& stage, double done) { bar.Show(stage, done); });
+    }
   }
   if (!report) return Refusal(*recording, report.error());
   if (recording->declared_stabilisation) {

@@ -11,6 +11,7 @@ namespace camgyro {
 
 Command CalibrateCommand();
 Command DiagnoseCommand();
+Command CompareCommand();
 Command DelayCommand();
 Command TrackCommand();
 Command SimulateCommand();

@@ -16,6 +16,7 @@ std::vector<Command> AllCommands() {
       DelayCommand(),      //
       TrackCommand(),      //
       SimulateCommand(),   //
+      CompareCommand(),    //
       ExportCommand(),     //
       HelpCommand(),
   };

@@ -13,7 +13,7 @@ packages=(
   # optional: recordings of VideoIMUCapture
   libprotobuf-dev protobuf-compiler
   # tests
-  libgmock-dev libgtest-dev
+  libgmock-dev libgtest-dev libbenchmark-dev
   # tools/measure*.py
   python3 python3-yaml
 )

@@ -32,7 +32,7 @@ TEST_F(CommandLineTest, BadUsageIsTwoAndSaysWhat) {
        "--residual?"},
       {"calibrate a --logtostderr", "unknown flag --logtostderr"},
       {"calibrate a --residual=point", "--residual=point: expected plane or determinant"},
-      {"calibrate a --estimator=magic", "--estimator=magic: expected window"},
+      {"calibrate a --estimator=magic", "--estimator=magic: expected window or ekf"},
       {"calibrate a --search_s=long", "--search_s: expected a number, got `long`"},
       {"calibrate a --search_s=-1", "--search_s: expected a positive number"},
       {"calibrate a --focal_px=0", "--focal_px: expected a positive number"},
