@@ -80,7 +80,7 @@ bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residu
   const LensParameters lens = Eigen::Map<const LensParameters>(parameters[0]);
   PairBearings bearings;
   const bool derivatives = jacobians != nullptr;
-  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2], derivatives,
+  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2], nullptr, derivatives,
                             &bearings)) {
     return false;
   }
@@ -108,10 +108,10 @@ bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residu
     for (int k = 0; k < kResidualsPerMatch; ++k) {
       const Eigen::RowVector4d by_e = -inv_sigma * bend.row(k);
       row.Clear();
-      into_b.Add(by_e.head<2>(), a, chain, pair.height_px, &row);
-      into_a.Add(by_e.tail<2>(), b, chain, pair.height_px, &row);
+      into_b.Add(by_e.head<2>(), a, chain, pair.size_px.y(), &row);
+      into_a.Add(by_e.tail<2>(), b, chain, pair.size_px.y(), &row);
       row.Write(kResidualsPerMatch * static_cast<int>(i) + k, 1.0, parameters[2],
-                pair.rate_group_sizes, kFirstRateGroup, jacobians);
+                pair, kFirstRateGroup, jacobians);
     }
   }
   return true;

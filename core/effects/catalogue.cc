@@ -20,6 +20,7 @@ const std::vector<EffectEntry>& EffectCatalogue() {
                                                      GyroScaleEntry(),
                                                      GyroMisalignmentEntry(),
                                                      GyroLowpassEntry(),
+                                                     GyroAxisDelayEntry(),
                                                      GyroSaturationEntry(),
                                                      BiasDriftEntry(),
                                                      ExposureDelayEntry(),

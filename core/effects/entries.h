@@ -19,6 +19,7 @@ EffectEntry ReadoutNonlinearEntry();
 EffectEntry GyroScaleEntry();
 EffectEntry GyroMisalignmentEntry();
 EffectEntry GyroLowpassEntry();
+EffectEntry GyroAxisDelayEntry();
 EffectEntry GyroSaturationEntry();
 EffectEntry BiasDriftEntry();
 EffectEntry ExposureDelayEntry();

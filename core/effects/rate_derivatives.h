@@ -1,0 +1,28 @@
+// Time derivatives of the gyro's readings, for effects that depend on them.
+#ifndef CAMGYRO_CORE_EFFECTS_RATE_DERIVATIVES_H_
+#define CAMGYRO_CORE_EFFECTS_RATE_DERIVATIVES_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/effects/effect.h"
+
+namespace camgyro {
+
+// Least-squares parabolas over 25 ms (at least 2 samples) to both sides of each sample; zero at the
+// ends. Columns: samples.
+struct RateDerivatives {
+  explicit RateDerivatives(const EffectSetup& setup);
+  // The sample at a time, or the first after it; -1 past the end.
+  Eigen::Index At(double time_gyro_s) const;
+  // Samples come every 25 ms or faster, and there are enough of them.
+  static bool Possible(const EffectSetup& setup);
+
+  std::vector<double> times_s;
+  Eigen::Matrix3Xd first;   // [rad/s^2]
+  Eigen::Matrix3Xd second;  // [rad/s^3]
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_CORE_EFFECTS_RATE_DERIVATIVES_H_
