@@ -1,6 +1,8 @@
 #include "core/recording.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "core/time.h"
 
@@ -46,25 +48,31 @@ double MedianInterval(const std::vector<Frame>& frames) { return MedianIntervalO
 
 std::vector<bool> FindSaturated(const std::vector<GyroSample>& gyro) {
   std::vector<bool> saturated(gyro.size(), false);
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double sign : {1.0, -1.0}) {
-      double rail = 0.0;
-      for (const GyroSample& sample : gyro) {
-        rail = std::max(rail, sign * sample.omega_gyro_rad_s[axis]);
-      }
-      int at = 0, below = 0;
-      for (const GyroSample& sample : gyro) {
-        const double share = sign * sample.omega_gyro_rad_s[axis] / rail;
-        if (share > 1.0 - 1e-6) {
-          ++at;
-        } else if (share > 0.97) {
-          ++below;
-        }
-      }
-      if (!(rail > 0.5) || at < 5 || at < 2 * below) continue;
-      for (size_t i = 0; i < gyro.size(); ++i) {
-        if (sign * gyro[i].omega_gyro_rad_s[axis] > (1.0 - 1e-6) * rail) saturated[i] = true;
-      }
+  // Largest value of each axis and sign, and those of them that are rails.
+  std::array<double, 6> largest{};
+  std::array<bool, 6> is_rail{};
+  const auto value = [&](const GyroSample& sample, size_t k) {
+    return (k < 3 ? 1.0 : -1.0) * sample.omega_gyro_rad_s[static_cast<Eigen::Index>(k % 3)];
+  };
+  for (size_t k = 0; k < 6; ++k) {
+    for (const GyroSample& sample : gyro) largest[k] = std::max(largest[k], value(sample, k));
+    int at = 0, below = 0;
+    for (const GyroSample& sample : gyro) {
+      const double share = value(sample, k) / largest[k];
+      at += share > 1.0 - 1e-6 ? 1 : 0;
+      below += share > 0.97 && share <= 1.0 - 1e-6 ? 1 : 0;
+    }
+    is_rail[k] = largest[k] > 0.5 && at >= 5 && at >= 2 * below;
+  }
+  for (size_t k = 0; k < 6; ++k) {
+    // The rail of another axis counts where this one reaches it, too.
+    const bool counts = std::any_of(is_rail.begin(), is_rail.end(), [&](const bool& rail) {
+      const double limit = largest[static_cast<size_t>(&rail - is_rail.data())];
+      return rail && std::abs(largest[k] - limit) < 1e-6 * limit;
+    });
+    if (!counts) continue;
+    for (size_t i = 0; i < gyro.size(); ++i) {
+      if (value(gyro[i], k) > (1.0 - 1e-6) * largest[k]) saturated[i] = true;
     }
   }
   return saturated;

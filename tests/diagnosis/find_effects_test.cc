@@ -1,0 +1,130 @@
+// The loop on small simulated recordings: silence, the right name, structure without a name.
+#include <gmock/gmock.h>
+
+#include "core/so3.h"
+#include "estimator/diagnosis/diagnose.h"
+#include "tools/simulation/simulate.h"
+
+namespace camgyro {
+namespace {
+
+constexpr char kWalking[] = R"(
+duration_s: 14
+motion: {kind: walking}
+tracks: {count: 70, noise_px: 0.5, outlier_fraction: 0.02}
+)";
+
+Recording Simulate(uint64_t seed, const std::vector<std::string>& overrides) {
+  auto scenario = simulation::ParseScenario(kWalking, overrides);
+  EXPECT_TRUE(scenario) << scenario.error().message;
+  auto simulated = simulation::SimulateTracks(*scenario, seed);
+  EXPECT_TRUE(simulated) << simulated.error().message;
+  return std::move(simulated->recording);
+}
+
+// Off the truth by what a start leaves.
+Diagnosis Find(const Recording& recording) {
+  LoopInput input;
+  input.recording = &recording;
+  input.start.width_px = 720;
+  input.start.height_px = 480;
+  input.start.lens = MakePinhole(665.0, {359.5, 239.5});
+  input.start.delay_s = 0.017;
+  input.start.readout_s = 0.0167;
+  input.start.q_gyro_cam =
+      simulation::MountOptions::DefaultRotation() * Exp(Eigen::Vector3d(0.01, -0.01, 0.01));
+  input.prior = input.start;
+  input.prior.prior_sigma << 97.0, 17.0, 17.0, 0.02, 0.05, Eigen::Vector3d::Constant(0.1),
+      Eigen::Vector3d::Constant(0.15);
+  input.graph.match_noise = recording.match_noise;
+  input.graph.gyro_sigma_rad_s = GyroSigma(recording, input.start.delay_s);
+  Diagnosis diagnosis;
+  const Result<Calibration> found = FindEffects(input, {}, nullptr, &diagnosis);
+  EXPECT_TRUE(found) << found.error().message;
+  return diagnosis;
+}
+
+// The null distribution of the score tests: p-values of all candidates on clean data.
+TEST(FindEffects, IsSilentAndItsPValuesAreUniformOnCleanData) {
+  int small = 0, all = 0;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    const Diagnosis diagnosis =
+        Find(Simulate(seed, {seed % 2 == 0 ? "motion.kind=running" : "motion.kind=walking",
+                             "tracks.outlier_fraction=" + std::to_string(0.03 * (seed - 1))}));
+    EXPECT_THAT(diagnosis.effects, testing::IsEmpty()) << seed;
+    EXPECT_FALSE(diagnosis.unexplained_structure) << seed;
+    for (const CandidateResult& candidate : diagnosis.rounds.front().candidates) {
+      small += candidate.p_value < 0.05 ? 1 : 0;
+      ++all;
+    }
+  }
+  EXPECT_EQ(all, 5 * 21);
+  EXPECT_LE(small, 14);  // 5 expected; candidates are correlated
+}
+
+TEST(FindEffects, NamesRadialDistortionAndReportsTheGain) {
+  const Diagnosis diagnosis =
+      Find(Simulate(3, {"effects.radial_distortion={k1: -0.12, k2: 0.02}"}));
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("radial_distortion"));
+  const DiagnosisRound& round = diagnosis.rounds.front();
+  EXPECT_EQ(round.added, "radial_distortion");
+  EXPECT_LT(round.after.chi2, round.before.chi2);
+  EXPECT_GT(round.report_gain.sum, 2.0 * round.report_gain.sigma);
+  const CandidateResult& found = round.candidates.front();
+  EXPECT_NEAR(found.estimate[0], -0.12, 3.0 * found.sigma[0]);
+  EXPECT_NEAR(found.estimate[1], 0.02, 3.0 * found.sigma[1]);
+  EXPECT_LT(found.sigma[0], 0.03);
+}
+
+TEST(FindEffects, NamesAClockThatRunsFast) {
+  const Diagnosis diagnosis = Find(Simulate(5, {"effects.clock_skew={ppm: 600}"}));
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("clock_skew"));
+  const CandidateResult& found = diagnosis.rounds.front().candidates.front();
+  EXPECT_NEAR(found.estimate[0], 600.0, 3.0 * found.sigma[0]);
+}
+
+// Not in the catalogue: every fifth stamp is 8 ms late.
+TEST(FindEffects, LeavesAPeriodicGlitchWithoutAName) {
+  Recording recording = Simulate(6, {});
+  for (size_t i = 0; i < recording.frames.size(); i += 5) recording.frames[i].stamp_ns += 8'000'000;
+  const Diagnosis diagnosis = Find(recording);
+  EXPECT_THAT(diagnosis.effects, testing::IsEmpty());
+  EXPECT_TRUE(diagnosis.unexplained_structure);
+  EXPECT_THAT(diagnosis.where, testing::Contains("delay frame by frame"));
+}
+
+// Not in the catalogue: a rotating prism shifts the picture round a circle.
+TEST(FindEffects, LeavesARotatingPrismWithoutAName) {
+  Recording recording = Simulate(7, {});
+  for (size_t i = 0; i < recording.frames.size(); ++i) {
+    const double phase = 2.0 * M_PI * static_cast<double>(i) / 45.0;
+    for (TrackedPoint& point : recording.tracks[i]) {
+      point.px += 10.0 * Eigen::Vector2d(std::cos(phase), std::sin(phase));
+    }
+  }
+  const Diagnosis diagnosis = Find(recording);
+  EXPECT_THAT(diagnosis.effects, testing::IsEmpty());
+  EXPECT_TRUE(diagnosis.unexplained_structure);
+  EXPECT_THAT(diagnosis.where, testing::Contains("rate error over time"));
+}
+
+// Not in the catalogue: the gyro reads too much at high rates.
+TEST(FindEffects, LeavesAGyroThatIsNotLinearWithoutAName) {
+  Recording recording = Simulate(8, {"motion.kind=running"});
+  for (GyroSample& sample : recording.gyro) {
+    sample.omega_gyro_rad_s +=
+        0.08 * sample.omega_gyro_rad_s.cwiseAbs().cwiseProduct(sample.omega_gyro_rad_s.cwiseAbs());
+  }
+  const Diagnosis diagnosis = Find(recording);
+  EXPECT_TRUE(diagnosis.unexplained_structure);
+  EXPECT_THAT(diagnosis.where, testing::Contains("rate error over the rate"));
+}
+
+TEST(FindEffects, SaysIfThereIsTooLittleToTest) {
+  const Diagnosis diagnosis = Find(Simulate(9, {"duration_s=2"}));
+  EXPECT_THAT(diagnosis.not_tested, testing::HasSubstr("too short"));
+  EXPECT_THAT(diagnosis.rounds, testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace camgyro

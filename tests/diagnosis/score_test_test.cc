@@ -1,0 +1,139 @@
+#include "estimator/diagnosis/score_test.h"
+
+#include <gmock/gmock.h>
+
+#include <random>
+
+namespace camgyro {
+namespace {
+
+// Blocks of a linear model: r = J x + noise, one pair per block part; parameters: a state of which
+// only focal length and delay show, and three candidates.
+Scores LinearScores(uint64_t seed, const Eigen::VectorXd& truth, double correlated = 0.0) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  Scores scores;
+  scores.num_model = kStateSize;
+  const Eigen::Index size = kStateSize + 3;
+  for (int b = 0; b < 12; ++b) {
+    BlockScore block;
+    block.time_s = b;
+    block.g.setZero(size);
+    block.H.setZero(size, size);
+    const double common = correlated * normal(generator);
+    for (int p = 0; p < 20; ++p) {
+      PairScore pair;
+      pair.block = b;
+      pair.time_s = b + p / 20.0;
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(30, size);
+      Eigen::VectorXd r(30);
+      for (int i = 0; i < 30; ++i) {
+        J(i, kStateFocal) = normal(generator);
+        J(i, kStateDelay) = normal(generator);
+        for (int k = 0; k < 3; ++k) {
+          J(i, kStateSize + k) = normal(generator) + 0.5 * J(i, kStateFocal);
+        }
+        r[i] = normal(generator) + common * J(i, kStateSize) - J.row(i).dot(truth);
+      }
+      pair.g = J.transpose() * r;
+      pair.H = (J.transpose() * J).topLeftCorner(kStateSize, kStateSize);
+      pair.chi2 = r.squaredNorm();
+      pair.residuals = 30;
+      block.g += pair.g;
+      block.H += J.transpose() * J;
+      block.chi2 += pair.chi2;
+      block.residuals += 30;
+      ++block.pairs;
+      scores.pairs.push_back(std::move(pair));
+    }
+    scores.blocks.push_back(std::move(block));
+  }
+  return scores;
+}
+
+Eigen::VectorXd Prior() { return Eigen::VectorXd::Constant(kStateSize + 3, 1e-4); }
+const std::vector<int> kCandidates = {kStateSize, kStateSize + 1, kStateSize + 2};
+
+TEST(ScoreTest, TailsAreThoseOfTheTables) {
+  EXPECT_NEAR(ChiSquareTail(3.841, 1.0), 0.05, 1e-4);
+  EXPECT_NEAR(ChiSquareTail(31.264, 11.0), 0.001, 1e-5);
+  EXPECT_NEAR(FTail(4.747, 1.0, 12.0), 0.05, 1e-4);
+  EXPECT_NEAR(FTail(3.490, 3.0, 12.0), 0.05, 1e-4);
+}
+
+// What the state explains is not an effect: a wrong focal length and delay do not show.
+TEST(ScoreTest, IsUniformUnderTheModelWhateverTheState) {
+  Eigen::VectorXd truth = Eigen::VectorXd::Zero(kStateSize + 3);
+  truth[kStateFocal] = 0.5;
+  truth[kStateDelay] = -0.3;
+  int below = 0;
+  double mean = 0.0;
+  constexpr int kRuns = 200;
+  for (int seed = 0; seed < kRuns; ++seed) {
+    const ScoreTest test = TestColumns(LinearScores(seed, truth), kCandidates, Prior());
+    EXPECT_EQ(test.dof, 3);
+    below += test.p_value < 0.1 ? 1 : 0;
+    mean += test.p_value / kRuns;
+  }
+  // The inflation is at least one, so that the test may be conservative, not the contrary.
+  EXPECT_LT(below, 30);  // 20 expected, 3 sigma above 32
+  EXPECT_GT(below, 3);
+  EXPECT_NEAR(mean, 0.55, 0.08);
+}
+
+TEST(ScoreTest, FindsAnEffectWithItsSize) {
+  Eigen::VectorXd truth = Eigen::VectorXd::Zero(kStateSize + 3);
+  truth[kStateSize + 1] = 0.1;  // sigma 0.012
+  const ScoreTest test = TestColumns(LinearScores(1, truth), kCandidates, Prior());
+  EXPECT_LT(test.p_value, 1e-6);
+  EXPECT_NEAR(test.estimate[1], 0.1, 4.0 * std::sqrt(test.covariance(1, 1)));
+  EXPECT_NEAR(std::sqrt(test.covariance(1, 1)), 0.012, 0.003);
+}
+
+// Scores that a block has in common (what jitters from block to block) raise the bar.
+TEST(ScoreTest, InflatesForWhatBlocksHaveInCommon) {
+  const Eigen::VectorXd truth = Eigen::VectorXd::Zero(kStateSize + 3);
+  int below = 0;
+  for (int seed = 0; seed < 100; ++seed) {
+    const ScoreTest test = TestColumns(LinearScores(seed, truth, 0.1), {kStateSize}, Prior());
+    EXPECT_GT(test.inflation, 1.5);
+    below += test.p_value < 0.05 ? 1 : 0;
+  }
+  EXPECT_LT(below, 13);  // without the inflation: about half of them
+}
+
+TEST(ScoreTest, FindsTheTimeOfAStepOfTheDelay) {
+  Scores scores = LinearScores(5, Eigen::VectorXd::Zero(kStateSize + 3));
+  for (PairScore& pair : scores.pairs) {
+    if (pair.time_s < 7.25) continue;
+    const Eigen::VectorXd change = 0.4 * pair.H.col(kStateDelay);
+    pair.g.head(kStateSize) -= change;
+    scores.blocks[static_cast<size_t>(pair.block)].g.head(kStateSize) -= change;
+  }
+  const StepSearch found = SearchDelayStep(scores, Prior(), 1.0);
+  EXPECT_LT(found.test.p_value, 1e-4);
+  EXPECT_NEAR(found.time_s, 7.25, 0.5);
+  EXPECT_NEAR(found.test.estimate[0], 0.4, 0.1);
+}
+
+TEST(ScoreTest, AFalseStepIsNotSignificant) {
+  int found = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    const Scores scores = LinearScores(seed, Eigen::VectorXd::Zero(kStateSize + 3));
+    found += SearchDelayStep(scores, Prior(), 1.0).test.p_value < 0.05 ? 1 : 0;
+  }
+  EXPECT_LE(found, 9);  // 3 expected
+}
+
+TEST(ScoreTest, KnowsWhatCannotBeToldApart) {
+  Scores scores = LinearScores(7, Eigen::VectorXd::Zero(kStateSize + 3));
+  EXPECT_LT(AliasOf(scores, {kStateSize}, {kStateSize + 1}, Prior()), 0.3);
+  for (BlockScore& block : scores.blocks) {  // the second candidate is twice the first
+    block.H.col(kStateSize + 1) = 2.0 * block.H.col(kStateSize);
+    block.H.row(kStateSize + 1) = 2.0 * block.H.row(kStateSize);
+  }
+  EXPECT_GT(AliasOf(scores, {kStateSize}, {kStateSize + 1}, Prior()), 0.999);
+}
+
+}  // namespace
+}  // namespace camgyro

@@ -1,0 +1,85 @@
+#include "estimator/diagnosis/shares.h"
+
+#include <gmock/gmock.h>
+
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "tools/simulation/simulate.h"
+
+namespace camgyro {
+namespace {
+
+Recording Tracks(double mean_life_frames) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 30.0;
+  scenario.tracks.count = 40;
+  scenario.tracks.mean_life_frames = mean_life_frames;
+  auto simulated = simulation::SimulateTracks(scenario);
+  EXPECT_TRUE(simulated);
+  return std::move(simulated->recording);
+}
+
+std::set<int> Frames(const std::vector<PairBlock>& blocks) {
+  std::set<int> frames;
+  for (const TimedPair& pair : Joined(blocks)) frames.insert({pair.frame_a, pair.frame_b});
+  return frames;
+}
+
+TEST(Shares, NoFrameIsInTwoShares) {
+  const Recording recording = Tracks(15.0);
+  const Shares shares = MakeShares(recording, MakeEstimationInput(recording));
+  const std::set<int> fit = Frames(shares.fit), choice = Frames(shares.choice),
+                      report = Frames(shares.report);
+  EXPECT_GT(fit.size(), 300u);
+  EXPECT_GT(choice.size(), 300u);
+  EXPECT_GT(report.size(), 120u);
+  std::set<int> all = fit;
+  all.insert(choice.begin(), choice.end());
+  all.insert(report.begin(), report.end());
+  EXPECT_EQ(all.size(), fit.size() + choice.size() + report.size());
+}
+
+TEST(Shares, NoTrackOfTheReportIsInAnotherShare) {
+  const Recording recording = Tracks(15.0);
+  const Shares shares = MakeShares(recording, MakeEstimationInput(recording));
+  ASSERT_FALSE(shares.report_shares_tracks);
+  // Tracks by where they are in which frame.
+  const auto key = [](int frame, const Eigen::Vector2d& px) {
+    return std::make_tuple(frame, px.x(), px.y());
+  };
+  std::map<std::tuple<int, double, double>, int64_t> id;
+  for (size_t f = 0; f < recording.tracks.size(); ++f) {
+    for (const TrackedPoint& point : recording.tracks[f]) {
+      id[key(static_cast<int>(f), point.px)] = point.track_id;
+    }
+  }
+  const auto tracks = [&](const std::vector<PairBlock>& blocks) {
+    std::set<int64_t> seen;
+    for (const TimedPair& pair : Joined(blocks)) {
+      for (const Match& match : pair.matches) seen.insert(id.at(key(pair.frame_a, match.px_a)));
+    }
+    return seen;
+  };
+  std::set<int64_t> others = tracks(shares.fit);
+  others.merge(tracks(shares.choice));
+  const std::set<int64_t> report = tracks(shares.report);
+  EXPECT_GT(report.size(), 100u);
+  for (const int64_t track : report) EXPECT_EQ(others.count(track), 0u) << track;
+}
+
+// Tracks that last until they leave the picture leave too few of their own: said, not hidden.
+TEST(Shares, SaysIfTracksGoOn) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 12.0;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kSlow);
+  const auto simulated = simulation::SimulateTracks(scenario);
+  ASSERT_TRUE(simulated);
+  const Shares shares = MakeShares(simulated->recording, MakeEstimationInput(simulated->recording));
+  EXPECT_TRUE(shares.report_shares_tracks);
+  EXPECT_GT(Joined(shares.report).front().matches.size(), 50u);
+}
+
+}  // namespace
+}  // namespace camgyro

@@ -1,0 +1,235 @@
+#!/usr/bin/python3
+"""Runs `camgyro diagnose` on every measured recording and writes docs/closed_loop.md with plots.
+
+    tools/closed_loop.py [path of camgyro]        (default: build/release/tools/camgyro)
+
+The recordings lie in $CAMGYRO_DATA (default: ../shared/data beside the source). docs/
+closed_loop_notes.md, the stories, is put in front of the tables word by word.
+"""
+import csv
+import math
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import matplotlib
+import yaml
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.path.join(SOURCE, "tools"))
+from measure import DATA, RECORDINGS  # noqa: E402
+
+# Recordings as they are; the lens of ov_* and euroc-* is not declared.
+NAMES = [name for name, variant, _ in RECORDINGS if not variant]
+BEFORE, AFTER = "#b35806", "#2166ac"  # told apart by colour-blind people and in grey
+
+
+def diagnose(camgyro, name, folder):
+    out = os.path.join(folder, name.replace("/", "_"))
+    begin = time.time()
+    run = subprocess.run([camgyro, "diagnose", os.path.join(DATA, name), "--out", out, "--quiet"],
+                         capture_output=True, text=True)
+    result = dict(name=name, exit=run.returncode, seconds=time.time() - begin, out=out,
+                  error=run.stderr.strip().splitlines()[-1:] or [""])
+    for key in ("diagnosis", "calibration", "calibration_before"):
+        path = os.path.join(out, key + ".yaml")
+        if os.path.exists(path):
+            with open(path, encoding="utf-8") as file:
+                result[key] = yaml.safe_load(file)
+    print(name, run.returncode, "%.0f s" % result["seconds"],
+          result.get("diagnosis", {}).get("verdict"), flush=True)
+    return result
+
+
+def number(value):
+    return "%.4g" % value
+
+
+def before_after(rounds, key, scale=1.0):
+    """First and last value in frames that neither fit nor choice has seen, with each round's own
+    noise: before the first effect, after the last."""
+    added = [r for r in rounds if r["added"] != "none"]
+    if not added:
+        return "%s" % number(scale * rounds[-1][key]["before"]) if rounds else ""
+    return " → ".join([number(scale * added[0][key]["before"])] +
+                      [number(scale * r[key]["after"]) for r in added])
+
+
+def row(result):
+    d = result.get("diagnosis")
+    if d is None:
+        return [result["name"], str(result["exit"]), "", "", "", "", result["error"][0]]
+    verdict = d["verdict"]
+    said = []
+    if verdict["unexplained_structure"]:
+        said.append("structure is left: " + ", ".join(verdict["where"]))
+    said += ["%s: %s" % (f["name"], f["finding"]) for f in d["faults"]]
+    if "not_tested" in verdict:
+        said.append(verdict["not_tested"])
+    if "refusal" in verdict:
+        said.append("refused: " + verdict["refusal"])
+    if verdict["indistinguishable"]:
+        said.append("cannot tell apart: " + "; ".join(", ".join(a)
+                                                      for a in verdict["indistinguishable"]))
+    rounds = d["rounds"]
+    scale = 1e3 if result["name"].startswith("tablet-attitude") else 1.0
+    gains = ", ".join("%.0f ± %.0f" % (r["unseen_gain"]["value"], r["unseen_gain"]["sigma"])
+                      for r in rounds if r["added"] != "none")
+    return [result["name"], str(result["exit"]), ", ".join(verdict["effects"]) or "none",
+            before_after(rounds, "unseen_rms_px", scale), before_after(rounds, "unseen_chi2"),
+            gains, "; ".join(said) or "nothing left"]
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join(["---"] * len(head)) + " |"]
+    lines += ["| " + " | ".join(r) + " |" for r in rows]
+    return "\n".join(lines) + "\n"
+
+
+def parameters(result):
+    """Every effect's numbers, as the fit on all frames has them."""
+    rows = []
+    for effect in (result.get("calibration") or {}).get("effects", []):
+        for p in effect["parameters"][:4]:
+            rows.append([result["name"], effect["name"], p["name"],
+                         "%.4g ± %.2g %s" % (p["value"], p["sigma"], p["unit"])])
+    return rows
+
+
+def state(result):
+    """Delay, readout and focal length without and with the effects."""
+    cells = [result["name"]]
+    for key in ("calibration_before", "calibration"):
+        c = result.get(key)
+        if c is None:
+            cells += ["", "", ""]
+            continue
+        show = lambda node, scale: "%.2f ± %.2f" % (scale * node["value"], scale * node["sigma"])
+        cells += [show(c["camera"]["focal_px"], 1.0), show(c["shutter"]["readout_s"], 1e3),
+                  show(c["clock"]["delay_s"], 1e3)]
+    return cells
+
+
+def maps(result, name):
+    """{'before'|'after': [(axis, part, value, sigma)]} of one map."""
+    found = {"before": [], "after": []}
+    path = os.path.join(result["out"], "residual_maps.csv")
+    if not os.path.exists(path):
+        return found
+    with open(path, encoding="utf-8") as file:
+        for line in csv.DictReader(file):
+            if line["map"] == name:
+                found[line["#when"]].append(line)
+    return found
+
+
+def plot_over_axis(results, name, map_name, parts, scale, labels, file):
+    result = next((r for r in results if r["name"] == name), None)
+    if result is None or "calibration" not in result:
+        return
+    data = maps(result, map_name)
+    figure, axes = plt.subplots(1, len(parts), figsize=(3.4 * len(parts), 3), sharey=True,
+                                squeeze=False)
+    for axis, part in zip(axes[0], parts):
+        for when, colour, shape in (("before", BEFORE, "o--"), ("after", AFTER, "s-")):
+            points = []
+            for line in data[when]:
+                at, _, which = line["axis"].partition("/")
+                if which == part and float(line["sigma"]) < 0.9 * max(
+                        float(x["sigma"]) for x in data[when]) or which == part and part:
+                    points.append((float(at), scale * float(line["value"])))
+            if points:
+                axis.plot(*zip(*sorted(points)), shape, color=colour, label=when, markersize=4)
+        axis.axhline(0, color="0.6", linewidth=0.8)
+        axis.set_xlabel(labels[0])
+        axis.set_title(part and "about gyro " + part)
+    axes[0][0].set_ylabel(labels[1])
+    axes[0][0].legend(frameon=False)
+    figure.suptitle("%s: %s" % (name, map_name))
+    figure.tight_layout()
+    figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
+    plt.close(figure)
+
+
+def plot_image(results, name, file):
+    result = next((r for r in results if r["name"] == name), None)
+    if result is None or "calibration" not in result:
+        return
+    data = maps(result, "shift over the image")
+    width, height = result["calibration"]["camera"]["resolution"]
+    figure, axes = plt.subplots(1, 2, figsize=(8, 3.2), sharey=True)
+    longest = 1e-9
+    fields = {}
+    for when in ("before", "after"):
+        cells = {}
+        for line in data[when]:
+            cells.setdefault((int(line["row"]), int(line["column"])), {})[line["axis"]] = float(
+                line["value"])
+        fields[when] = cells
+        longest = max([longest] + [math.hypot(c["x"], c["y"]) for c in cells.values()])
+    for axis, when in zip(axes, ("before", "after")):
+        rows = 1 + max(r for r, _ in fields[when])
+        columns = 1 + max(c for _, c in fields[when])
+        at = [(c * width / (columns - 1), r * height / (rows - 1)) for r, c in fields[when]]
+        shift = [(v["x"], v["y"]) for v in fields[when].values()]
+        axis.quiver(*zip(*at), *zip(*shift), angles="xy", scale_units="xy",
+                    scale=longest / (0.12 * width), color=BEFORE if when == "before" else AFTER)
+        axis.set_xlim(-0.12 * width, 1.12 * width)
+        axis.set_ylim(1.12 * height, -0.12 * height)
+        axis.set_aspect("equal")
+        axis.set_title("%s (longest arrow %.2f px)" % (
+            when, max(math.hypot(*s) for s in shift)))
+        axis.set_xlabel("u [px]")
+    axes[0].set_ylabel("v [px]")
+    figure.suptitle(name + ": shift over the image that the model lacks")
+    figure.tight_layout()
+    figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
+    plt.close(figure)
+
+
+def main():
+    camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
+    plt.rcParams.update({"font.size": 9, "svg.hashsalt": "camgyro"})
+    folder = tempfile.mkdtemp(prefix="closed_loop_")
+    with ThreadPoolExecutor(2) as pool:
+        results = list(pool.map(lambda name: diagnose(camgyro, name, folder), NAMES))
+    for name in ("D12", "D13"):
+        plot_over_axis(results, "tablet-attitude/" + name,
+                       "rate error over the angular acceleration", ["x", "y", "z"], 1e3,
+                       ("slope of the rate [rad/s²]", "rate error [mrad/s]"),
+                       "closed_loop_tablet_%s.svg" % name)
+    plot_over_axis(results, "ov_handheld_rs_skew", "delay over time", [""], 1e3,
+                   ("time [s]", "delay left [ms]"), "closed_loop_skew.svg")
+    plot_image(results, "ov_handheld_rs", "closed_loop_ov.svg")
+    plot_image(results, "euroc-v101-flight", "closed_loop_euroc.svg")
+    with open(SOURCE + "/docs/closed_loop.md", "w", encoding="utf-8") as out:
+        out.write("# The closed loop on measured data\n\nMade by `tools/closed_loop.py`; the text "
+                  "before the tables is `docs/closed_loop_notes.md`.\n\n")
+        with open(SOURCE + "/docs/closed_loop_notes.md", encoding="utf-8") as notes:
+            out.write(notes.read())
+        out.write("\n## Before and after\n\nIn frames that neither the fit nor the choice of the "
+                  "effect has seen; rms in px (tablet-attitude: mrad), chi2 per residual, both with "
+                  "the noise of the fit before each effect; fall of chi2 ± its scatter between "
+                  "stretches, one per effect.\n\n")
+        out.write(table(["Recording", "Exit", "Effects", "rms", "chi2/dof", "fall of chi2", "Left"],
+                        [row(r) for r in results]))
+        out.write("\n## Size of the effects\n\nFrom the fit on all frames.\n\n")
+        out.write(table(["Recording", "Effect", "Parameter", "Value"],
+                        [p for r in results for p in parameters(r)]))
+        out.write("\n## Calibration without and with the effects\n\n")
+        out.write(table(["Recording", "f [px]", "t_r [ms]", "t_d [ms]", "f with", "t_r with",
+                         "t_d with"], [state(r) for r in results if "calibration_before" in r]))
+        out.write("\nSeconds, two recordings at a time: " + ", ".join(
+            "%s %.0f" % (r["name"], r["seconds"]) for r in results) + ".\n")
+    shutil.rmtree(folder)
+
+
+if __name__ == "__main__":
+    main()
