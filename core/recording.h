@@ -105,6 +105,8 @@ struct Recording {
   // What the reader saw and a user should know (unit converted, samples dropped, clock rebuilt).
   std::vector<std::string> notes;
 
+  // No pixels: attitudes made elsewhere are all there is of the camera.
+  bool HasOnlyAttitudes() const { return matches.empty() && tracks.empty() && !HasImages(); }
   bool HasImages() const {
     return !video_file.empty() || (!frames.empty() && !frames.front().image_file.empty());
   }

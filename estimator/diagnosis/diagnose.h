@@ -38,6 +38,7 @@ struct CandidateResult {
   std::string rejected;  // why not, empty if it could be chosen
   std::vector<EffectParameter> parameter_info;
   Eigen::VectorXd estimate, sigma;  // of the refit, else of the score test
+  Eigen::VectorXd start;            // one step in the fit share: where a refit begins
 };
 
 // How frames that neither fit nor choice has seen fit, all with the same noise.

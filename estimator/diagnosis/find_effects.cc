@@ -98,9 +98,8 @@ class Loop {
         progress_(progress),
         input_(MakeEstimationInput(*in.recording)),
         shares_(MakeShares(*in.recording, input_)) {
-    for (const auto* blocks : {&shares_.fit, &shares_.choice, &shares_.report}) {
-      for (const PairBlock& block : *blocks) pairs_ += block.size();
-    }
+    Thin(kMostFitPairs, &shares_.fit);
+    Thin(kMostChoicePairs, &shares_.choice);
   }
 
   Result<Calibration> Run(Diagnosis* out) {
@@ -155,8 +154,25 @@ class Loop {
   }
 
  private:
+  // Of recordings with pixels. A fit needs no more to tell effects apart: what it gets wrong within
+  // its noise is projected out of the test. Time is spent on the refits.
+  static constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
   static constexpr double kAliasLimit = 0.95;
   static constexpr double kStrongMisfit = 0.02;  // gain of one effect over chi2
+
+  // Leaves every n-th pair, so that at most `most` stay.
+  void Thin(size_t most, std::vector<PairBlock>* blocks) const {
+    const size_t stride = (Joined(*blocks).size() + most - 1) / most;
+    if (stride < 2 || in_.recording->HasOnlyAttitudes()) return;
+    size_t at = 0;
+    for (PairBlock& block : *blocks) {
+      PairBlock kept;
+      for (TimedPair& pair : block) {
+        if (at++ % stride == 0) kept.push_back(std::move(pair));
+      }
+      block = std::move(kept);
+    }
+  }
 
   void Tell(int round) const {
     if (progress_) progress_("diagnosis", std::min(0.99, (round + 0.2) / options_.max_rounds));
@@ -178,7 +194,7 @@ class Loop {
     refinement.graph.sigma_px = noise;
     refinement.sigma_rad = noise;
     refinement.cluster_s = shares_.block_s;
-    refinement.max_rounds = 5;
+    refinement.max_rounds = 4;
     return Refine(input_, Joined(shares_.fit), start, in_.prior, refinement);
   }
 
@@ -248,6 +264,8 @@ class Loop {
       std::vector<double> gain = gain_of_fit_step(candidate.columns());
       for (size_t i = 0; i < gain.size(); ++i) gain[i] -= without[i];
       all.emplace_back(MakeResult(candidate, test, SumOf(gain)), candidate);
+      all.back().first.start = StepOf(fit, candidate.columns(), fit_prior)
+                                   .segment(candidate.first, candidate.effect->size());
     }
     AddStepCandidate(setup, fit, choice, prior, &all);
     AddTurnCandidate(setup, choice, &all);
@@ -371,6 +389,8 @@ class Loop {
       }
       Calibration start = fit_.calibration;
       AddEffect(candidate, &start);
+      const int columns = candidate.effect->size();
+      if (r.start.size() == columns) start.effect_values.tail(columns) = r.start;
       start.prior_sigma = in_.prior.prior_sigma;
       Result<Refined> fit = Fit(start, noise);
       if (round == 0 && best_gain > kStrongMisfit * Chi2Of(choice)) {
@@ -515,8 +535,7 @@ class Loop {
   const DiagnoseOptions& options_;
   const Progress& progress_;
   const EstimationInput input_;
-  const Shares shares_;
-  size_t pairs_ = 0;
+  Shares shares_;
   Refined fit_;
   std::vector<StructureMap> last_maps_;
 };
