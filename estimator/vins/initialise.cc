@@ -20,6 +20,7 @@ constexpr double kMinParallaxRad = 0.01;
 // The mean specific force of a second or more is gravity, but for the change of velocity.
 constexpr double kMaxGravityErrorMS2 = 3.0;
 constexpr double kMaxAccelNoiseFactor = 15.0;
+constexpr double kMinInlierRatio = 0.5;
 
 [[gnu::format(printf, 1, 2)]] std::string Format(const char* format, ...) {
   va_list arguments;
@@ -59,7 +60,8 @@ bool Covers(const std::vector<AccelSample>& accel, const VinsWindow& window) {
          widest_s <= 0.05;
 }
 
-VinsStart Refuse(VinsStart start, VinsVerdict verdict, std::string explanation) {
+VinsStart Refuse(const VinsStart& so_far, VinsVerdict verdict, std::string explanation) {
+  VinsStart start = so_far;
   start.verdict = verdict;
   start.explanation = std::move(explanation);
   return start;
@@ -81,6 +83,8 @@ std::string VinsVerdictName(VinsVerdict verdict) {
       return "too_little_parallax";
     case VinsVerdict::kAccelerometerImplausible:
       return "accelerometer_implausible";
+    case VinsVerdict::kCalibrationImplausible:
+      return "calibration_implausible";
     case VinsVerdict::kImprecise:
       return "imprecise";
     case VinsVerdict::kNotConverged:
@@ -95,10 +99,10 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
   const Result<VinsWindow> window = MakeVinsWindow(input, options.keyframe_interval_s);
   if (!window) {
     if (window.error().kind == ErrorKind::kBadInput) return tl::unexpected(window.error());
-    return Refuse(std::move(start), VinsVerdict::kTooFewTracks, window.error().message);
+    return Refuse(start, VinsVerdict::kTooFewTracks, window.error().message);
   }
   if (!Covers(input.accel, *window)) {
-    return Refuse(std::move(start), VinsVerdict::kNoAccelerometer,
+    return Refuse(start, VinsVerdict::kNoAccelerometer,
                   input.accel.empty()
                       ? "there is no accelerometer: scale and gravity cannot be known"
                       : "the accelerometer's samples do not cover the window without holes");
@@ -110,7 +114,7 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
   start.excitation_m_s2 =
       std::sqrt((forces.colwise() - mean).squaredNorm() / static_cast<double>(forces.cols()));
   if (std::abs(mean.norm() - options.gravity_m_s2) > kMaxGravityErrorMS2) {
-    return Refuse(std::move(start), VinsVerdict::kAccelerometerImplausible,
+    return Refuse(start, VinsVerdict::kAccelerometerImplausible,
                   Format("the mean specific force is %.2f m/s^2 where gravity alone makes %.2f: "
                          "another unit, axes that do not turn with the gyro's, or gravity already "
                          "taken out?",
@@ -127,11 +131,11 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
   // (b)
   const Result<VinsStructure> structure = FindStructure(*window);
   if (!structure) {
-    return Refuse(std::move(start), VinsVerdict::kTooFewTracks, structure.error().message);
+    return Refuse(start, VinsVerdict::kTooFewTracks, structure.error().message);
   }
   start.parallax_rad = structure->parallax_rad;
   if (start.parallax_rad < std::max(kMinParallaxRad, 5.0 * structure->noise_rad)) {
-    return Refuse(std::move(start), VinsVerdict::kTooLittleParallax,
+    return Refuse(start, VinsVerdict::kTooLittleParallax,
                   Format("the camera hardly moves: points are seen under angles that differ by "
                          "%.2f deg only (median)",
                          start.parallax_rad * 180.0 / M_PI));
@@ -142,25 +146,32 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
       AlignWithInertial(*window, *structure, options.p_gyro_cam_m, options.accel_bias_sigma_m_s2,
                         options.gravity_m_s2);
   if (!alignment) {
-    return Refuse(std::move(start), VinsVerdict::kAccelerometerImplausible,
-                  alignment.error().message);
+    return Refuse(start, VinsVerdict::kAccelerometerImplausible, alignment.error().message);
   }
 
   // (d)
   if (Status refined = RefineVins(*window, *structure, *alignment, options, &start); !refined) {
-    return Refuse(std::move(start), VinsVerdict::kNotConverged, refined.error().message);
+    return Refuse(start, VinsVerdict::kNotConverged, refined.error().message);
   }
   for (size_t k = 0; k < start.states.size(); ++k) {
     start.states[k].frame_stamp_ns =
         input.frame_stamps_ns[static_cast<size_t>(window->keyframes[k].frame)];
   }
+  start.inlier_ratio =
+      static_cast<double>(start.observations) / static_cast<double>(window->observations.size());
+  if (start.inlier_ratio < kMinInlierRatio) {
+    return Refuse(
+        start, VinsVerdict::kCalibrationImplausible,
+        Format("only %.0f %% of the tracked points agree with the gyro's rotations: wrong "
+               "delay, mounting, lens or readout time?",
+               100.0 * start.inlier_ratio));
+  }
   if (start.accel_noise_factor > kMaxAccelNoiseFactor) {
-    const double factor = start.accel_noise_factor;
     return Refuse(
         std::move(start), VinsVerdict::kAccelerometerImplausible,
         Format("the accelerometer contradicts camera and gyro %.0f times beyond its noise: "
                "wrong axes, scale, clock, or calibration",
-               factor));
+               start.accel_noise_factor));
   }
   if (!(start.scale_sigma <= options.ready_scale) ||
       !(start.gravity_sigma_rad <= options.ready_gravity_rad)) {
@@ -168,7 +179,7 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
         Format("known so far: scale to %.1f %%, gravity to %.2f deg; wanted: %.1f %%, %.2f deg",
                100.0 * start.scale_sigma, start.gravity_sigma_rad * 180.0 / M_PI,
                100.0 * options.ready_scale, options.ready_gravity_rad * 180.0 / M_PI);
-    return Refuse(std::move(start), VinsVerdict::kImprecise, explanation);
+    return Refuse(start, VinsVerdict::kImprecise, explanation);
   }
   start.verdict = VinsVerdict::kReady;
   start.explanation =

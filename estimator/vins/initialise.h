@@ -40,6 +40,7 @@ enum class VinsVerdict {
   kTooLittleExcitation,       // the accelerometer feels nothing but gravity: no scale
   kTooLittleParallax,         // the camera turns, but hardly moves: no structure
   kAccelerometerImplausible,  // it contradicts the camera and the gyro: axes, unit, clock
+  kCalibrationImplausible,    // most tracks contradict the gyro's rotations: delay, mounting, lens
   kImprecise,                 // sound, but scale or gravity are not known well enough yet
   kNotConverged,
 };
@@ -91,7 +92,8 @@ struct VinsStart {
   double scale_sigma = 0.0;        // relative
   double gravity_sigma_rad = 0.0;  // the larger of the two axes
   double noise_px = 0.0;           // of an observation, per axis
-  int observations = 0;            // used
+  int observations = 0;            // used; of those in keyframes, the share
+  double inlier_ratio = 0.0;
   // Accelerometer noise that the window shows, over the one assumed; sigmas are scaled by it.
   double accel_noise_factor = 1.0;
 };

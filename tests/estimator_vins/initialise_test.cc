@@ -202,6 +202,16 @@ TEST(InitialiseVins, WrongAccelerometerIsNamed) {
   EXPECT_EQ(with([](Vector3d* a) { *a = -*a; }), VinsVerdict::kAccelerometerImplausible);
 }
 
+TEST(InitialiseVins, WrongDelayIsNoStart) {
+  Case c = MakeCase(WalkingScenario(2.0));
+  c.input.calibration.delay_s -= 0.045;
+  const VinsVerdict verdict = VerdictOf(c.input);
+  EXPECT_TRUE(verdict == VinsVerdict::kCalibrationImplausible ||
+              verdict == VinsVerdict::kAccelerometerImplausible ||
+              verdict == VinsVerdict::kNotConverged)
+      << VinsVerdictName(verdict);
+}
+
 TEST(InitialiseVins, SteadyMotionHasNoScale) {
   Scenario scenario = WalkingScenario(2.0);
   scenario.motion.step_hz = 0.0;
