@@ -17,6 +17,7 @@ using Eigen::Vector3d;
 
 constexpr double kMinExcitationMS2 = 0.05;
 constexpr double kMinParallaxRad = 0.01;
+constexpr double kMinParallaxNoises = 5.0;
 // The mean specific force of a second or more is gravity, but for the change of velocity.
 constexpr double kMaxGravityErrorMS2 = 3.0;
 constexpr double kMaxAccelNoiseFactor = 15.0;
@@ -122,7 +123,7 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
   }
   if (start.excitation_m_s2 < kMinExcitationMS2) {
     return Refuse(
-        std::move(start), VinsVerdict::kTooLittleExcitation,
+        start, VinsVerdict::kTooLittleExcitation,
         Format("the accelerometer feels hardly more than gravity (changes of %.3f m/s^2): "
                "move with changing speed to make the scale known",
                start.excitation_m_s2));
@@ -134,11 +135,18 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
     return Refuse(start, VinsVerdict::kTooFewTracks, structure.error().message);
   }
   start.parallax_rad = structure->parallax_rad;
-  if (start.parallax_rad < std::max(kMinParallaxRad, 5.0 * structure->noise_rad)) {
+  if (start.parallax_rad < kMinParallaxRad) {
     return Refuse(start, VinsVerdict::kTooLittleParallax,
                   Format("the camera hardly moves: points are seen under angles that differ by "
                          "%.2f deg only (median)",
                          start.parallax_rad * 180.0 / M_PI));
+  }
+  if (start.parallax_rad < kMinParallaxNoises * structure->noise_rad) {
+    return Refuse(
+        start, VinsVerdict::kCalibrationImplausible,
+        Format("directions to tracked points scatter by %.2f deg with the gyro's rotations "
+               "taken out: wrong delay, mounting, lens or readout time?",
+               structure->noise_rad * 180.0 / M_PI));
   }
 
   // (c) and gravity's length
@@ -168,7 +176,7 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
   }
   if (start.accel_noise_factor > kMaxAccelNoiseFactor) {
     return Refuse(
-        std::move(start), VinsVerdict::kAccelerometerImplausible,
+        start, VinsVerdict::kAccelerometerImplausible,
         Format("the accelerometer contradicts camera and gyro %.0f times beyond its noise: "
                "wrong axes, scale, clock, or calibration",
                start.accel_noise_factor));
