@@ -34,19 +34,47 @@ struct Row {
   bool needs_pixels;
 };
 
+// Two digits of the sigma.
+int Decimals(double sigma) {
+  return sigma > 0.0 ? std::min(6, std::max(0, 1 - static_cast<int>(std::floor(std::log10(sigma)))))
+                     : 6;
+}
+
 std::string TableRow(const Row& row, const Calibration& c, bool attitudes) {
   const double sigma = row.unit_scale * c.sigma()[row.index];
   if (attitudes && row.needs_pixels) return "";
-  // Two digits of the sigma.
-  const int decimals =
-      sigma > 0.0 ? std::min(6, std::max(0, 1 - static_cast<int>(std::floor(std::log10(sigma)))))
-                  : 6;
+  const int decimals = Decimals(sigma);
   const bool determined = c.determined[static_cast<size_t>(row.index)];
   return Format("  %-22s %12.*f ± %-9.*f ", row.name, decimals, row.unit_scale * row.value,
                 decimals, sigma) +
          (determined ? std::string(row.unit)
                      : Format("%-6s not determined by this recording", row.unit)) +
          "\n";
+}
+
+// Each effect with its parameters, at most four of a kind; seconds as ms.
+std::string EffectRows(const Calibration& c) {
+  std::string rows;
+  if (!c.effects) return rows;
+  for (const EffectSet::Item& item : c.effects->items()) {
+    rows += "  " + item.entry->name + (item.effect->size() == 0 ? " (no number of its own)" : "") +
+            "\n";
+    for (int k = 0; k < item.effect->size(); ++k) {
+      if (k == 4 && item.effect->size() > 5) {
+        rows += Format("    and %d more, in calibration.yaml\n", item.effect->size() - 4);
+        break;
+      }
+      const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+      const bool seconds = p.unit == "s";
+      const int column = item.first + k;
+      const double scale = seconds ? 1e3 : 1.0;
+      const double sigma = scale * std::sqrt(c.effect_covariance(column, column));
+      rows += Format("    %-20s %12.*f ± %-9.*f %s\n", p.name.c_str(), Decimals(sigma),
+                     scale * c.effect_values[column], Decimals(sigma), sigma,
+                     seconds ? "ms" : p.unit.c_str());
+    }
+  }
+  return rows;
 }
 
 }  // namespace
@@ -70,7 +98,7 @@ std::string ParameterTable(const Calibration& c, bool attitudes) {
       {"mounting, about z", kStateRotation + 2, turn.z(), kDegrees, "deg", false}};
   std::string table;
   for (const Row& row : rows) table += TableRow(row, c, attitudes);
-  return table +
+  return table + EffectRows(c) +
          "  (t_gyro = t_camera + delay; the mounting is what is left, about the camera's\n"
          "  axes, after " +
          DescribePermutation(nearest.P_gyro_cam) + ")\n";
