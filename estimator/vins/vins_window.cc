@@ -142,6 +142,7 @@ Result<VinsWindow> MakeVinsWindow(const VinsInput& input, double interval_s) {
   }
 
   const Lens& lens = GetLens(calibration.distortion_model);
+  const LensParameters full_lens = calibration.FullLens();
   std::map<int64_t, std::vector<VinsObservation>> by_track;
   for (size_t k = 0; k < window.keyframes.size(); ++k) {
     const auto frame = static_cast<size_t>(window.keyframes[k].frame);
@@ -151,7 +152,7 @@ Result<VinsWindow> MakeVinsWindow(const VinsInput& input, double interval_s) {
       seen.keyframe = static_cast<int>(k);
       seen.px = point.px;
       seen.time_s = RowTimeGyroS(stamp_s, shutter, point.px.y(), height);
-      if (!lens.Unproject(point.px, calibration.lens, &seen.ray)) continue;
+      if (!lens.Unproject(point.px, full_lens, &seen.ray)) continue;
       seen.direction_world = (q_world_ref * (window.imu.RotationAt(seen.time_s) *
                                              (calibration.q_gyro_cam * seen.ray.ray)))
                                  .normalized();

@@ -54,7 +54,8 @@ struct VinsWindow {
 };
 
 // Keyframes about interval_s apart, the first and the last frame among them; tracks seen in at
-// least three. Errors: kBadInput for data that are not finite or not in order; kCannotEstimate for
+// least three. Of the calibration's effects those that are a constant part of the lens count; effects
+// of clock and rate do not. Errors: kBadInput for data that are not finite or not in order; kCannotEstimate for
 // fewer than 4 keyframes, gyro samples that do not cover them, fewer than 15 tracks.
 Result<VinsWindow> MakeVinsWindow(const VinsInput& input, double interval_s);
 
