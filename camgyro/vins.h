@@ -47,7 +47,7 @@ struct VinsState {
 
 struct VinsLandmark {
   std::int64_t track_id = 0;
-  std::array<double, 4> point{};  // homogeneous: (x, y, z) / w in the world [m]
+  std::array<double, 4> point{};  // homogeneous: (x, y, z) / w in the world [m]; w <= 0: far away
   std::array<double, 9> covariance_m2{};
   int observations = 0;
 };

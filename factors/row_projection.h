@@ -24,7 +24,8 @@ namespace camgyro {
 //             p_gyro_cam 3      camera in the gyro frame [m]
 //             calibration 11    deviation from the calibration that row times, rays and deltas were
 //                               made with, in the order of StateIndex
-//             point 4           homogeneous (X, w), unit norm, w >= 0: points at any distance
+//             point 4           homogeneous (X, w), unit norm: points at any distance (w < 0: seen
+//                                beyond infinity, as noise may have it)
 // Residual    2, in sigmas
 // Valid       for points before the camera (else the evaluation fails); |T| below 0.1 s, since the
 //             accelerometer's bias is neglected in between (1e-3 m at 0.2 m/s^2)

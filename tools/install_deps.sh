@@ -10,6 +10,8 @@ packages=(
   libeigen3-dev libceres-dev libsuitesparse-dev libgflags-dev libgoogle-glog-dev
   libopencv-dev libavformat-dev libavcodec-dev libswscale-dev libavutil-dev
   libyaml-cpp-dev libexpected-dev libfast-float-dev
+  # Python module
+  pybind11-dev python3-dev python3-numpy
   # tests
   libgmock-dev libgtest-dev
   # tools/measure.py

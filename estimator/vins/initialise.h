@@ -57,7 +57,7 @@ struct VinsState {
 
 struct VinsLandmark {
   int64_t track_id = 0;
-  // Homogeneous: the point is head<3>() / w() in the world [m]; w near 0: too far to tell.
+  // Homogeneous: the point is head<3>() / w() in the world [m]; w near 0 or below: too far to tell.
   Eigen::Vector4d point = Eigen::Vector4d::UnitZ();
   Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  // of the point, to first order
   int observations = 0;                                     // inliers

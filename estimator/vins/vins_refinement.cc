@@ -93,9 +93,6 @@ class Problem {
     ceres::Solver::Summary summary;
     ceres::Solve(options, problem_.get(), &summary);
     if (!summary.IsSolutionUsable()) return CannotEstimate("the joint refinement failed");
-    for (Eigen::Vector4d& point : points_) {
-      if (point[3] < 0.0) point = -point;
-    }
     UpdateNoise();
     if (!last) DropOutliers();
     if (static_cast<int>(used_landmarks_.size()) < 8) {
@@ -283,6 +280,11 @@ class Problem {
   }
 
   Status FillCovariance(VinsStart* start) {
+    // Ceres' covariance does not ask whether its Jacobian could be evaluated.
+    double cost = 0.0;
+    if (!problem_->Evaluate({}, &cost, nullptr, nullptr, nullptr) || !std::isfinite(cost)) {
+      return CannotEstimate("the joint refinement ended where it cannot be evaluated");
+    }
     // The first pose is the world; the others in the order of VinsStart::covariance.
     std::vector<const double*> blocks;
     for (size_t k = 0; k < nodes_.size(); ++k) {

@@ -54,9 +54,10 @@ struct VinsWindow {
 };
 
 // Keyframes about interval_s apart, the first and the last frame among them; tracks seen in at
-// least three. Of the calibration's effects those that are a constant part of the lens count; effects
-// of clock and rate do not. Errors: kBadInput for data that are not finite or not in order; kCannotEstimate for
-// fewer than 4 keyframes, gyro samples that do not cover them, fewer than 15 tracks.
+// least three. Of the calibration's effects those that are a constant part of the lens count;
+// effects of clock and rate do not. Errors: kBadInput for data that are not finite or not in order;
+// kCannotEstimate for fewer than 4 keyframes, gyro samples that do not cover them, fewer than 15
+// tracks.
 Result<VinsWindow> MakeVinsWindow(const VinsInput& input, double interval_s);
 
 }  // namespace camgyro
