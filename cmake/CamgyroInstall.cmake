@@ -20,8 +20,23 @@ install(DIRECTORY core factors frontend estimator
 install(FILES frontend/readers/read_recording.h
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro/frontend/readers)
 
+# libcamgyro and its headers, <camgyro/calibrator.h>. An export set of its own: a program that uses
+# only them needs none of what the static libraries need.
+install(TARGETS camgyro_camgyro EXPORT camgyroApiTargets
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+get_target_property(api_headers camgyro_camgyro CAMGYRO_PUBLIC_HEADERS)
+foreach(header ${api_headers})
+  if(header STREQUAL "version.h")
+    install(FILES ${PROJECT_BINARY_DIR}/include/camgyro/version.h
+            DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro)
+  else()
+    install(FILES camgyro/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro)
+  endif()
+endforeach()
+
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/camgyro)
 install(EXPORT camgyroTargets NAMESPACE camgyro:: DESTINATION ${package_dir})
+install(EXPORT camgyroApiTargets NAMESPACE camgyro:: DESTINATION ${package_dir})
 configure_package_config_file(cmake/camgyroConfig.cmake.in ${PROJECT_BINARY_DIR}/camgyroConfig.cmake
                               INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/camgyroConfigVersion.cmake

@@ -12,6 +12,8 @@ packages=(
   libyaml-cpp-dev nlohmann-json3-dev libexpected-dev libfast-float-dev
   # optional: recordings of VideoIMUCapture
   libprotobuf-dev protobuf-compiler
+  # Python module
+  pybind11-dev python3-dev python3-numpy
   # tests
   libgmock-dev libgtest-dev libbenchmark-dev
   # tools/measure*.py

@@ -1,0 +1,119 @@
+// Calibrates while the sensors run. Link with camgyro::camgyro (libcamgyro.so).
+//
+//   auto calibrator = camgyro::api::Calibrator::Create(options, &error);
+//   calibrator->AddGyro(stamp_ns, wx, wy, wz);            // from the gyro's thread
+//   calibrator->AddImage(stamp_ns, {pixels, w, h, stride});  // from the camera's thread
+//   if (calibrator->snapshot()->ready) ...                // from any one thread
+//
+// Threads: one producer per stream (gyro, accelerometer, frames), one reader, at the same time.
+// Everything is estimated in one thread of the calibrator's own. Adding copies the data and
+// returns; a snapshot never waits for estimation. Memory is bounded: by max_frames_waiting images,
+// 20 s of tracks and 60 s of inertial samples, whatever is fed. Nothing here throws or exits.
+#ifndef CAMGYRO_CALIBRATOR_H_
+#define CAMGYRO_CALIBRATOR_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "camgyro/export.h"
+#include "camgyro/types.h"
+#include "camgyro/vins.h"
+
+namespace camgyro::api {
+
+struct CalibratorOptions {
+  CameraGuess camera;  // the size is needed
+  // Ready means: standard deviation below these, and steady for two seconds.
+  double ready_focal = 0.01;      // of the focal length
+  double ready_principal = 0.01;  // of the width
+  double ready_readout_s = 1e-3;
+  double ready_delay_s = 1e-3;
+  double ready_bias_rad_s = 5e-3;
+  double ready_rotation_rad = 10e-3;
+  // Seconds of motion before the first search for a start.
+  double start_s = 5.0;
+  // Images (or frames of tracks) that wait for the worker; beyond, kQueueFull.
+  std::size_t max_frames_waiting = 90;
+};
+
+enum class Stage {
+  kCollecting,  // not enough frames yet, or no start was found: Snapshot::message says why
+  kEstimating,
+  kStopped,  // an error inside (out of memory, say): the message says which
+};
+
+enum class Readiness {
+  kNoEstimate,
+  kUndetermined,  // the motion so far tells next to nothing of it
+  kImprecise,     // known, but not to the sigma asked for
+  kUnsteady,      // its estimate still moves by more than that
+  kReady,
+};
+CAMGYRO_API const char* ToString(Readiness readiness) noexcept;
+
+struct ParameterState {
+  double value = 0.0;  // 0 for the three angles: see Calibration::q_gyro_cam_wxyz
+  double sigma = 0.0;
+  double wanted_sigma = 0.0;
+  Readiness readiness = Readiness::kNoEstimate;
+};
+
+struct Snapshot {
+  Stage stage = Stage::kCollecting;
+  std::string message;      // for people
+  Calibration calibration;  // meaningful once `has_estimate`
+  bool has_estimate = false;
+  std::array<ParameterState, kParameters> parameters{};
+  bool ready = false;                // all of them
+  std::int64_t frame_stamp_ns = 0;   // the latest frame in the estimate
+  double noise_px = 0.0;             // of a match, per axis
+  std::uint64_t frames = 0;          // processed by the worker
+  std::uint64_t frames_dropped = 0;  // answered with kQueueFull
+  std::uint64_t pairs_used = 0, pairs_skipped = 0;
+  int starts = 0;  // searches for a start so far; more than one after a refusal or a restart
+};
+
+class Calibrator {
+ public:
+  // Null for options that are not finite or out of range; *error says which, if it is not null.
+  CAMGYRO_API static std::unique_ptr<Calibrator> Create(const CalibratorOptions& options,
+                                                        std::string* error) noexcept;
+  CAMGYRO_API ~Calibrator();
+  Calibrator(const Calibrator&) = delete;
+  Calibrator& operator=(const Calibrator&) = delete;
+
+  // Angular rate in the gyro frame [rad/s], below 200 each. Stamps of all streams: |stamp| < 4e18.
+  CAMGYRO_API AddResult AddGyro(std::int64_t stamp_ns, double x, double y, double z) noexcept;
+  // Specific force in the gyro frame [m/s^2], below 2000 each; the gyro's clock. Only the VINS
+  // initialisation needs it.
+  CAMGYRO_API AddResult AddAccel(std::int64_t stamp_ns, double x, double y, double z) noexcept;
+  // The stamp of the first row, camera clock. Either images or tracks; the first call decides, and
+  // the other is then kOutOfRange.
+  CAMGYRO_API AddResult AddImage(std::int64_t stamp_ns, const ImageView& image) noexcept;
+  // In any order of ids. kOutOfRange: an id twice, a point further outside of the picture than its
+  // size, more than 5000 points.
+  CAMGYRO_API AddResult AddTracks(std::int64_t stamp_ns, const TrackPoint* points,
+                                  std::size_t count) noexcept;
+
+  // The latest state; never null, and does not change once you have it. Renewed after every solve.
+  CAMGYRO_API std::shared_ptr<const Snapshot> snapshot() const noexcept;
+
+  // Starts a VIO on the latest frames with the present calibration. Takes part of a second, in the
+  // calling thread; the producers go on.
+  CAMGYRO_API VinsStart InitialiseVins(const VinsSettings& settings) const noexcept;
+
+  // Waits until the worker has nothing left to do, for recordings that come faster than real time.
+  // False after timeout_s.
+  CAMGYRO_API bool WaitUntilIdle(double timeout_s) const noexcept;
+
+ private:
+  class Worker;
+  explicit Calibrator(std::unique_ptr<Worker> worker);
+  std::unique_ptr<Worker> worker_;
+};
+
+}  // namespace camgyro::api
+
+#endif  // CAMGYRO_CALIBRATOR_H_

@@ -1,0 +1,191 @@
+#include "camgyro/online_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/time.h"
+#include "estimator/calibrate.h"
+#include "estimator/start/focal_scan.h"
+#include "estimator/window/estimation_input.h"
+#include "frontend/camera_rotations.h"
+
+namespace camgyro {
+namespace {
+
+constexpr double kCollectS = 12.0;    // of frames at most, for the start
+constexpr double kGyroS = 60.0;       // of samples that may wait for frames
+constexpr size_t kMaxGyro = 100'000;  // and their number
+constexpr double kBetweenStartsS = 2.0;
+constexpr double kSearchS = 2.0;       // half range of delays
+constexpr size_t kMaxScanPairs = 120;  // per trial focal length
+constexpr size_t kMaxWaiting = 300;    // frames whose gyro samples have not come
+constexpr double kGyroMarginS = 0.06;  // of samples beyond a pair, so that the delay can move
+constexpr double kSteadyS = 2.0;
+constexpr double kStaleS = 5.0;  // frames without a solved window
+
+}  // namespace
+
+std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
+                                  const std::vector<TrackedPoint>& b) {
+  std::vector<Match> matches;
+  for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
+    if (i->track_id == j->track_id) {
+      matches.push_back({(i++)->px, (j++)->px});
+    } else {
+      i->track_id < j->track_id ? ++i : ++j;
+    }
+  }
+  return matches;
+}
+
+OnlineCalibration::OnlineCalibration(const CameraGuess& camera, MatchNoise noise, double start_s,
+                                     std::function<void(const Progress&)> listener)
+    : camera_(camera), noise_(noise), start_s_(start_s), listener_(std::move(listener)) {
+  progress_.message = "collecting the first frames";
+}
+
+void OnlineCalibration::AddGyro(const GyroSample& sample) {
+  gyro_.push_back(sample);
+  const double keep_s = window_ ? kGyroS : kCollectS + 2.0 * kSearchS;
+  while (gyro_.size() > kMaxGyro ||
+         SecondsSince(gyro_.front().stamp_ns, sample.stamp_ns) > keep_s) {
+    gyro_.pop_front();
+  }
+  if (window_) ProcessWaiting();
+}
+
+void OnlineCalibration::AddFrame(OnlineFrame frame) {
+  ++progress_.frames;
+  frames_.push_back(std::move(frame));
+  window_ ? ProcessWaiting() : Collect();
+  if (window_ && SecondsSince(last_solved_ns_, frames_.back().stamp_ns) > kStaleS) GiveUp();
+  listener_(progress_);
+}
+
+void OnlineCalibration::Collect() {
+  const int64_t newest_ns = frames_.back().stamp_ns;
+  while (SecondsSince(frames_.front().stamp_ns, newest_ns) > kCollectS ||
+         frames_.size() > 10 * kMaxWaiting) {
+    frames_.pop_front();
+  }
+  const double span_s = SecondsSince(frames_.front().stamp_ns, newest_ns);
+  if (span_s < start_s_ || newest_ns < next_start_ns_) return;
+  if (gyro_.size() < 2 ||
+      SecondsSince(gyro_.front().stamp_ns, gyro_.back().stamp_ns) < 0.5 * span_s) {
+    progress_.message = "there are frames, but hardly any gyro samples";
+    return;
+  }
+  ++progress_.starts;
+  next_start_ns_ = StampAt(newest_ns, kBetweenStartsS);
+  if (const Status started = TryStart(); !started) {
+    progress_.message = started.error().message;
+    return;
+  }
+  progress_.message = "estimating";
+  progress_.estimating = true;
+  last_solved_ns_ = frames_.back().stamp_ns;
+  ProcessWaiting();
+}
+
+Status OnlineCalibration::TryStart() {
+  Recording recording;
+  recording.camera = camera_;
+  recording.match_noise = noise_;
+  recording.gyro.assign(gyro_.begin(), gyro_.end());
+  for (const OnlineFrame& frame : frames_) {
+    recording.frames.emplace_back().stamp_ns = frame.stamp_ns;
+    recording.tracks.push_back(frame.points);
+  }
+  const std::vector<FramePair> pairs = SpreadPairs(PairsForRotations(recording), kMaxScanPairs);
+  StartOptions options;
+  options.search_s = kSearchS;
+  const Result<StartResult> start = FindStartAndFocal(
+      recording,
+      [&](double focal_px) { return CameraRotationsOf(pairs, recording.camera, focal_px); },
+      options, {});
+  if (!start) return tl::unexpected(start.error());
+
+  const Calibration prior = MakePrior(recording, *start);
+  prior_sigma_ = prior.prior_sigma;
+  Calibration from = prior;
+  from.bias_gyro_rad_s = start->bias_gyro_rad_s;
+  if (start->focal && start->focal->determined) from.lens[kFocal] = start->focal->value_px;
+  SlidingWindowOptions window_options;
+  window_options.graph.match_noise = noise_;
+  window_options.graph.gyro_sigma_rad_s = GyroSigma(recording, start->delay_middle_row_s);
+  window_.emplace(from, prior, gyro_.front().stamp_ns, window_options);
+  window_->SetListener([this](const WindowUpdate& update) { Remember(update); });
+  history_.clear();
+  return {};
+}
+
+void OnlineCalibration::ProcessWaiting() {
+  while (frames_.size() >= 2) {
+    if (!AddPair(frames_[0], frames_[1])) {
+      if (frames_.size() <= kMaxWaiting) break;
+      ++skipped_here_;
+    }
+    frames_.pop_front();
+  }
+  progress_.pairs_used = used_before_ + static_cast<uint64_t>(window_->num_used_pairs());
+  progress_.pairs_skipped =
+      skipped_before_ + skipped_here_ + static_cast<uint64_t>(window_->num_skipped_pairs());
+}
+
+// False if the gyro has not come so far.
+bool OnlineCalibration::AddPair(const OnlineFrame& a, const OnlineFrame& b) {
+  const Calibration& estimate = window_->latest().estimate;
+  const int64_t needed_ns =
+      StampAt(b.stamp_ns, estimate.delay_s + std::max(0.0, estimate.readout_s) + kGyroMarginS);
+  if (gyro_.empty() || gyro_.back().stamp_ns < needed_ns) return false;
+  while (!gyro_.empty() && gyro_.front().stamp_ns <= needed_ns) {
+    // Refused is what differs from its neighbour by less than a double tells: nothing is lost.
+    (void)window_->AddGyroSample(gyro_.front());
+    gyro_.pop_front();
+  }
+  if (window_->AddPair(a.stamp_ns, b.stamp_ns, MatchesBetween(a.points, b.points)) !=
+      camgyro::AddResult::kAccepted) {
+    ++skipped_here_;
+  }
+  return true;
+}
+
+void OnlineCalibration::Remember(const WindowUpdate& update) {
+  last_solved_ns_ = std::max(last_solved_ns_, update.frame_stamp_ns);
+  progress_.estimate = update.estimate;
+  progress_.estimate->prior_sigma = prior_sigma_;
+  progress_.frame_stamp_ns = update.frame_stamp_ns;
+  progress_.noise_px = update.noise_px;
+  history_.emplace_back(update.frame_stamp_ns, update.estimate);
+  while (history_.size() > 2 &&
+         SecondsSince(history_[1].first, update.frame_stamp_ns) >= kSteadyS) {
+    history_.pop_front();
+  }
+  progress_.movement.setConstant(std::numeric_limits<double>::infinity());
+  if (SecondsSince(history_.front().first, update.frame_stamp_ns) >= kSteadyS) {
+    progress_.movement.setZero();
+    for (const auto& [stamp_ns, then] : history_) {
+      progress_.movement =
+          progress_.movement.cwiseMax(Difference(update.estimate, then).cwiseAbs());
+    }
+  }
+  listener_(progress_);
+}
+
+// The window has lost its way, or the gyro is gone: back to the search for a start.
+void OnlineCalibration::GiveUp() {
+  used_before_ += static_cast<uint64_t>(window_->num_used_pairs());
+  skipped_before_ += static_cast<uint64_t>(window_->num_skipped_pairs());
+  window_.reset();
+  progress_.estimating = false;
+  progress_.estimate.reset();
+  progress_.movement.setConstant(std::numeric_limits<double>::infinity());
+  progress_.message = "the estimate was given up: no frame could be used for 5 s";
+  // What was fed to the window is gone; a start needs gyro and frames of the same time.
+  const OnlineFrame newest = std::move(frames_.back());
+  frames_.clear();
+  frames_.push_back(newest);
+}
+
+}  // namespace camgyro

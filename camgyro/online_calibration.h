@@ -1,0 +1,79 @@
+// What a Calibrator's worker does, in one thread: collects, finds a start, runs the sliding window.
+#ifndef CAMGYRO_ONLINE_CALIBRATION_H_
+#define CAMGYRO_ONLINE_CALIBRATION_H_
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/recording.h"
+#include "core/result.h"
+#include "estimator/window/sliding_window.h"
+
+namespace camgyro {
+
+struct OnlineFrame {
+  int64_t stamp_ns = 0;
+  std::vector<TrackedPoint> points;  // by ascending track id
+};
+
+// Not thread-safe. Stamps of each stream increase, values are finite: the caller has checked.
+class OnlineCalibration {
+ public:
+  struct Progress {
+    bool estimating = false;
+    std::string message;                  // why there is no start yet
+    std::optional<Calibration> estimate;  // with covariance and prior_sigma
+    int64_t frame_stamp_ns = 0;
+    double noise_px = 0.0;
+    // Largest change of each parameter within the last two seconds of the camera; infinite before.
+    StateVector movement = StateVector::Constant(std::numeric_limits<double>::infinity());
+    uint64_t frames = 0, pairs_used = 0, pairs_skipped = 0;
+    int starts = 0;
+  };
+
+  // start_s: of frames before the first search for a start. `listener` is called after each frame
+  // and each solved window.
+  OnlineCalibration(const CameraGuess& camera, MatchNoise noise, double start_s,
+                    std::function<void(const Progress&)> listener);
+
+  void AddGyro(const GyroSample& sample);
+  void AddFrame(OnlineFrame frame);
+
+ private:
+  void Collect();
+  Status TryStart();
+  void ProcessWaiting();
+  bool AddPair(const OnlineFrame& a, const OnlineFrame& b);
+  void Remember(const WindowUpdate& update);
+  void GiveUp();
+
+  const CameraGuess camera_;
+  const MatchNoise noise_;
+  const double start_s_;
+  const std::function<void(const Progress&)> listener_;
+  Progress progress_;
+  StateVector prior_sigma_ = StateVector::Zero();
+
+  std::deque<GyroSample> gyro_;     // not yet in the window
+  std::deque<OnlineFrame> frames_;  // collected, or waiting for the gyro; the first was used
+  int64_t next_start_ns_ = 0;       // camera clock: no search before
+  std::optional<SlidingWindow> window_;
+  uint64_t used_before_ = 0, skipped_before_ = 0;  // by windows that were given up
+  uint64_t skipped_here_ = 0;                      // frames that waited too long
+  int64_t last_solved_ns_ = 0;                     // frame of the latest solved window
+  std::deque<std::pair<int64_t, Calibration>> history_;
+};
+
+// Matches of the tracks seen in both frames; both by ascending id.
+std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
+                                  const std::vector<TrackedPoint>& b);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ONLINE_CALIBRATION_H_

@@ -1,0 +1,108 @@
+// prepare_vio RECORDING DIR: calibrates, and writes what a VIO needs of it.
+//   calibration.yaml   in camgyro's format: `camgyro export` makes VINS-Fusion and OpenVINS files
+//   of
+//                      it
+//   image_times.csv    each frame's time on the gyro's clock: of its first row (for a VIO that
+//   knows
+//                      the rolling shutter) and of its middle row (for one that does not). With
+//                      these stamps the VIO's td starts at zero
+//   readiness.csv      each parameter with its sigma, and whether it is good enough
+#include <camgyro/calibrator.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include "feed.h"
+#include "frontend/readers/read_recording.h"
+
+using namespace camgyro::api;
+
+namespace {
+
+std::int64_t OnGyroClock(std::int64_t stamp_ns, const Calibration& c, double row_fraction) {
+  return stamp_ns + std::llround(1e9 * (c.delay_s + row_fraction * c.readout_s));
+}
+
+void WriteCalibration(const Snapshot& snapshot, std::ostream& out) {
+  const Calibration& c = snapshot.calibration;
+  const auto& p = snapshot.parameters;
+  const auto& k = c.distortion;
+  const auto& b = c.bias_gyro_rad_s;
+  const auto& q = c.q_gyro_cam_wxyz;
+  const bool distorted = k[0] != 0.0 || k[1] != 0.0 || k[2] != 0.0 || k[3] != 0.0;
+  out.precision(12);
+  out << "camera:\n  resolution: [" << c.width_px << ", " << c.height_px << "]\n"
+      << "  focal_px: {value: " << c.focal_px << ", sigma: " << p[kFocal].sigma << "}\n"
+      << "  principal_px: {value: [" << c.principal_px[0] << ", " << c.principal_px[1]
+      << "], sigma: [" << p[kCx].sigma << ", " << p[kCy].sigma << "]}\n"
+      << "  aspect_ratio: {value: " << c.aspect_ratio << "}\n"
+      << "  distortion: {model: " << (distorted ? "radtan" : "none") << ", value: [";
+  if (distorted) out << k[0] << ", " << k[1] << ", " << k[2] << ", " << k[3];
+  out << "]}\n"
+      << "shutter: {readout_s: {value: " << c.readout_s << ", sigma: " << p[kReadout].sigma
+      << "}}\n"
+      << "clock: {delay_s: {value: " << c.delay_s << ", sigma: " << p[kDelay].sigma << "}}\n"
+      << "gyro: {bias_rad_s: {value: [" << b[0] << ", " << b[1] << ", " << b[2] << "], sigma: ["
+      << p[kBiasX].sigma << ", " << p[kBiasY].sigma << ", " << p[kBiasZ].sigma << "]}}\n"
+      << "extrinsics: {q_gyro_cam_wxyz: {value: [" << q[0] << ", " << q[1] << ", " << q[2] << ", "
+      << q[3] << "], sigma_rad: [" << p[kRotationX].sigma << ", " << p[kRotationY].sigma << ", "
+      << p[kRotationZ].sigma << "]}}\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::cerr << "usage: prepare_vio RECORDING DIR\n";
+    return 2;
+  }
+  const auto recording = camgyro::ReadRecording(argv[1]);
+  CalibratorOptions options;
+  std::string error = recording ? "no size of the pictures is declared" : recording.error().message;
+  if (!recording || !GuessFrom(*recording, &options.camera)) {
+    std::cerr << error << "\n";
+    return 3;
+  }
+  const auto calibrator = Calibrator::Create(options, &error);
+  if (calibrator == nullptr) {
+    std::cerr << error << "\n";
+    return 3;
+  }
+  // As fast as the worker follows: no frame is dropped.
+  const bool fed =
+      Feed(*recording, calibrator.get(), [&](double) { return calibrator->WaitUntilIdle(120.0); });
+  if (!fed || !calibrator->WaitUntilIdle(120.0)) return 1;
+  const auto snapshot = calibrator->snapshot();
+  if (!snapshot->has_estimate) {
+    std::cerr << "cannot estimate: " << snapshot->message << "\n";
+    return 4;
+  }
+
+  const std::filesystem::path folder(argv[2]);
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  std::ofstream calibration(folder / "calibration.yaml"), times(folder / "image_times.csv"),
+      readiness(folder / "readiness.csv");
+  WriteCalibration(*snapshot, calibration);
+  times << "#frame stamp [ns],first row, gyro clock [ns],middle row, gyro clock [ns]\n";
+  for (const camgyro::Frame& frame : recording->frames) {
+    times << frame.stamp_ns << "," << OnGyroClock(frame.stamp_ns, snapshot->calibration, 0.0) << ","
+          << OnGyroClock(frame.stamp_ns, snapshot->calibration, 0.5) << "\n";
+  }
+  readiness << "#parameter,sigma,wanted sigma,readiness\n";
+  for (int i = 0; i < kParameters; ++i) {
+    const ParameterState& p = snapshot->parameters[i];
+    readiness << ParameterName(i) << "," << p.sigma << "," << p.wanted_sigma << ","
+              << ToString(p.readiness) << "\n";
+  }
+  if (!calibration.flush() || !times.flush() || !readiness.flush()) {
+    std::cerr << folder << ": cannot be written\n";
+    return 3;
+  }
+  std::cout << (snapshot->ready ? "ready" : "not all parameters are ready: see readiness.csv")
+            << "\n";
+  return 0;
+}

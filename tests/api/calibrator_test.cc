@@ -1,0 +1,396 @@
+// The streaming library as a program of others uses it: public headers only (the simulator makes
+// the data).
+#include "camgyro/calibrator.h"
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "camgyro/version.h"
+#include "core/time.h"
+#include "tools/simulation/render.h"
+#include "tools/simulation/simulate.h"
+
+namespace camgyro::api {
+namespace {
+
+using simulation::Scenario;
+using simulation::Simulated;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Scenario LivelyScenario(double duration_s) {
+  Scenario scenario;
+  scenario.duration_s = duration_s;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  scenario.motion.rotation_rms_rad_s.setConstant(0.5);
+  scenario.tracks.count = 60;
+  scenario.tracks.noise_px = 0.3;
+  return scenario;
+}
+
+CalibratorOptions OptionsFor(const Scenario& scenario) {
+  CalibratorOptions options;
+  options.camera.width_px = scenario.camera.width_px;
+  options.camera.height_px = scenario.camera.height_px;
+  options.max_frames_waiting = 1000;  // tests feed faster than real time
+  return options;
+}
+
+std::unique_ptr<Calibrator> Make(const CalibratorOptions& options) {
+  std::string error;
+  auto calibrator = Calibrator::Create(options, &error);
+  EXPECT_NE(calibrator, nullptr) << error;
+  return calibrator;
+}
+
+AddResult Add(Calibrator* c, const GyroSample& s) {
+  const Eigen::Vector3d& w = s.omega_gyro_rad_s;
+  return c->AddGyro(s.stamp_ns, w.x(), w.y(), w.z());
+}
+AddResult Add(Calibrator* c, const AccelSample& s) {
+  const Eigen::Vector3d& a = s.accel_gyro_m_s2;
+  return c->AddAccel(s.stamp_ns, a.x(), a.y(), a.z());
+}
+std::vector<TrackPoint> Points(const std::vector<TrackedPoint>& points) {
+  std::vector<TrackPoint> out;
+  for (const TrackedPoint& p : points) out.push_back({p.track_id, p.px.x(), p.px.y()});
+  return out;
+}
+AddResult Add(Calibrator* c, const Recording& r, size_t frame) {
+  const std::vector<TrackPoint> points = Points(r.tracks[frame]);
+  return c->AddTracks(r.frames[frame].stamp_ns, points.data(), points.size());
+}
+
+// Everything in the order of time, in one thread.
+void Feed(Calibrator* c, const Recording& r) {
+  size_t gyro = 0, accel = 0;
+  const auto until = [&](int64_t stamp_ns) {
+    for (; gyro < r.gyro.size() && r.gyro[gyro].stamp_ns <= stamp_ns; ++gyro) {
+      ASSERT_EQ(Add(c, r.gyro[gyro]), AddResult::kAccepted);
+    }
+    for (; accel < r.accel.size() && r.accel[accel].stamp_ns <= stamp_ns; ++accel) {
+      ASSERT_EQ(Add(c, r.accel[accel]), AddResult::kAccepted);
+    }
+  };
+  for (size_t i = 0; i < r.frames.size(); ++i) {
+    until(r.frames[i].stamp_ns);
+    ASSERT_EQ(Add(c, r, i), AddResult::kAccepted);
+  }
+  until(std::numeric_limits<int64_t>::max());
+}
+
+double Sigmas(double estimate, double truth, const ParameterState& p) {
+  return std::abs(estimate - truth) / p.sigma;
+}
+
+TEST(Calibrator, FindsTheTruthAndSaysWhenItIsReady) {
+  const Scenario scenario = LivelyScenario(9.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto calibrator = Make(OptionsFor(scenario));
+  EXPECT_EQ(calibrator->snapshot()->stage, Stage::kCollecting);
+  EXPECT_FALSE(calibrator->snapshot()->has_estimate);
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  EXPECT_EQ(snapshot->stage, Stage::kEstimating);
+  EXPECT_EQ(snapshot->frames, s.recording.frames.size());
+  EXPECT_EQ(snapshot->pairs_used + snapshot->pairs_skipped + 1, s.recording.frames.size());
+  EXPECT_EQ(snapshot->pairs_skipped, 0u);
+  EXPECT_NEAR(snapshot->noise_px, 0.3, 0.05);
+  const Calibration& c = snapshot->calibration;
+  const auto& p = snapshot->parameters;
+  EXPECT_LT(Sigmas(c.focal_px, s.truth.lens[camgyro::kFocal], p[kFocal]), 4.0);
+  EXPECT_LT(Sigmas(c.readout_s, s.truth.readout_s, p[kReadout]), 4.0);
+  EXPECT_LT(Sigmas(c.delay_s, s.truth.delay_s, p[kDelay]), 4.0);
+  const Eigen::Quaterniond q(c.q_gyro_cam_wxyz[0], c.q_gyro_cam_wxyz[1], c.q_gyro_cam_wxyz[2],
+                             c.q_gyro_cam_wxyz[3]);
+  EXPECT_LT(q.angularDistance(s.truth.q_gyro_cam), 0.01);
+  for (int i = 0; i < kParameters; ++i) {
+    EXPECT_DOUBLE_EQ(p[static_cast<size_t>(i)].sigma,
+                     std::sqrt(c.covariance[static_cast<size_t>(i * kParameters + i)]));
+  }
+  EXPECT_EQ(p[kDelay].readiness, Readiness::kReady) << ToString(p[kDelay].readiness);
+  EXPECT_EQ(p[kFocal].readiness, Readiness::kReady) << ToString(p[kFocal].readiness);
+  EXPECT_TRUE(snapshot->ready);
+
+  // And a VIO can start from it.
+  VinsSettings settings;
+  settings.accel_noise_m_s2_rtHz = scenario.gyro.accel_noise_density_m_s2_rtHz;
+  const VinsStart start = calibrator->InitialiseVins(settings);
+  ASSERT_EQ(start.verdict, VinsVerdict::kReady) << start.explanation;
+  const VinsState& last = start.states.back();
+  const simulation::CameraState truth =
+      s.camera->trajectory().At(1e-9 * static_cast<double>(last.time_ns - scenario.start_ns));
+  // Velocities in different worlds: their lengths agree, but for the lever arm (0.06 m x 1 rad/s).
+  const double speed =
+      Eigen::Vector3d(last.v_world_m_s[0], last.v_world_m_s[1], last.v_world_m_s[2]).norm();
+  EXPECT_NEAR(speed, truth.v_world_m_s.norm(), 0.12);
+  EXPECT_EQ(start.covariance.size(), start.covariance_size * start.covariance_size);
+  EXPECT_EQ(start.covariance_size, 9 * start.states.size() + 9 + kParameters);
+}
+
+TEST(Calibrator, WrongAskedPrecisionIsNotReady) {
+  const Scenario scenario = LivelyScenario(7.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  CalibratorOptions options = OptionsFor(scenario);
+  options.ready_delay_s = 1e-9;
+  const auto calibrator = Make(options);
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate);
+  EXPECT_FALSE(snapshot->ready);
+  EXPECT_EQ(snapshot->parameters[kDelay].readiness, Readiness::kImprecise);
+}
+
+TEST(Calibrator, WithoutMotionItSaysWhy) {
+  Scenario scenario = LivelyScenario(7.0);
+  scenario.motion.rotation_rms_rad_s.setConstant(1e-5);
+  scenario.motion.step_nod_rad = 0.0;
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  const auto snapshot = calibrator->snapshot();
+  EXPECT_EQ(snapshot->stage, Stage::kCollecting);
+  EXPECT_GE(snapshot->starts, 1);
+  EXPECT_FALSE(snapshot->message.empty());
+  EXPECT_EQ(snapshot->parameters[kDelay].readiness, Readiness::kNoEstimate);
+  EXPECT_EQ(calibrator->InitialiseVins({}).verdict, VinsVerdict::kNoCalibration);
+}
+
+TEST(Calibrator, GyroThatNeverComesIsNamed) {
+  const Scenario scenario = LivelyScenario(6.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto calibrator = Make(OptionsFor(scenario));
+  for (size_t i = 0; i < s.recording.frames.size(); ++i) {
+    ASSERT_EQ(Add(calibrator.get(), s.recording, i), AddResult::kAccepted);
+  }
+  ASSERT_TRUE(calibrator->WaitUntilIdle(60.0));
+  EXPECT_THAT(calibrator->snapshot()->message, testing::HasSubstr("gyro"));
+}
+
+TEST(Calibrator, BadSamplesAreRefusedByTheirKind) {
+  const Scenario scenario = LivelyScenario(1.0);
+  const auto calibrator = Make(OptionsFor(scenario));
+  Calibrator* c = calibrator.get();
+  EXPECT_EQ(c->AddGyro(1000, 0, 0, 0), AddResult::kAccepted);
+  EXPECT_EQ(c->AddGyro(1000, 1, 2, 3), AddResult::kDuplicate);
+  EXPECT_EQ(c->AddGyro(999, 0, 0, 0), AddResult::kOutOfOrder);
+  EXPECT_EQ(c->AddGyro(2000, 0, kNan, 0), AddResult::kNotFinite);
+  EXPECT_EQ(c->AddGyro(2000, 0, 1e5, 0), AddResult::kOutOfRange);
+  EXPECT_EQ(c->AddGyro(std::numeric_limits<int64_t>::max(), 0, 0, 0), AddResult::kOutOfRange);
+  EXPECT_EQ(c->AddGyro(2000, 0, 0, 0), AddResult::kAccepted);  // nothing of it stuck
+  EXPECT_EQ(c->AddAccel(5, 0, 0, 9.8), AddResult::kAccepted);
+  EXPECT_EQ(c->AddAccel(5, 0, 0, 9.8), AddResult::kDuplicate);
+  EXPECT_EQ(c->AddAccel(6, 0, 0, 1e9), AddResult::kOutOfRange);
+
+  const TrackPoint good[] = {{7, 10.0, 20.0}, {3, 30.0, 40.0}};
+  const TrackPoint twice[] = {{7, 10.0, 20.0}, {7, 30.0, 40.0}};
+  const TrackPoint far[] = {{7, 1e7, 20.0}};
+  const TrackPoint nan[] = {{7, kNan, 20.0}};
+  EXPECT_EQ(c->AddTracks(100, good, 2), AddResult::kAccepted);
+  EXPECT_EQ(c->AddTracks(100, good, 2), AddResult::kDuplicate);
+  EXPECT_EQ(c->AddTracks(50, good, 2), AddResult::kOutOfOrder);
+  EXPECT_EQ(c->AddTracks(200, twice, 2), AddResult::kOutOfRange);
+  EXPECT_EQ(c->AddTracks(200, far, 1), AddResult::kOutOfRange);
+  EXPECT_EQ(c->AddTracks(200, nan, 1), AddResult::kNotFinite);
+  EXPECT_EQ(c->AddTracks(200, nullptr, 3), AddResult::kOutOfRange);
+  EXPECT_EQ(c->AddTracks(200, nullptr, 0), AddResult::kAccepted);  // a frame without features
+  const std::vector<std::uint8_t> pixels(720 * 480);
+  EXPECT_EQ(c->AddImage(300, {pixels.data(), 720, 480, 720}), AddResult::kOutOfRange);
+  EXPECT_EQ(c->AddImage(300, {pixels.data(), 640, 480, 640}), AddResult::kWrongSize);
+  EXPECT_EQ(c->AddImage(300, {nullptr, 720, 480, 720}), AddResult::kWrongSize);
+  EXPECT_EQ(c->AddImage(300, {pixels.data(), 720, 480, 100}), AddResult::kWrongSize);
+}
+
+TEST(Calibrator, BadOptionsAreRefusedWithAReason) {
+  const auto refused = [](auto change) {
+    CalibratorOptions options;
+    options.camera.width_px = 640;
+    options.camera.height_px = 480;
+    change(&options);
+    std::string error;
+    const bool null = Calibrator::Create(options, &error) == nullptr;
+    EXPECT_EQ(null, !error.empty());
+    return null;
+  };
+  EXPECT_FALSE(refused([](CalibratorOptions*) {}));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->camera.width_px = 0; }));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->camera.focal_px = kNan; }));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->camera.readout_s = kNan; }));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->camera.distortion[1] = kNan; }));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->camera.q_gyro_cam_wxyz = {0, 0, 0, 0}; }));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->ready_delay_s = 0.0; }));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->start_s = kNan; }));
+  EXPECT_TRUE(refused([](CalibratorOptions* o) { o->max_frames_waiting = 0; }));
+}
+
+TEST(Calibrator, QueueIsBounded) {
+  const Scenario scenario = LivelyScenario(8.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  CalibratorOptions options = OptionsFor(scenario);
+  options.max_frames_waiting = 3;
+  const auto calibrator = Make(options);
+  for (const GyroSample& sample : s.recording.gyro) {
+    ASSERT_EQ(Add(calibrator.get(), sample), AddResult::kAccepted);
+  }
+  uint64_t full = 0;
+  for (size_t i = 0; i < s.recording.frames.size(); ++i) {
+    full += Add(calibrator.get(), s.recording, i) == AddResult::kQueueFull;
+  }
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  EXPECT_GT(full, 0u);  // matching and copying take longer than feeding
+  EXPECT_EQ(calibrator->snapshot()->frames + full, s.recording.frames.size());
+}
+
+TEST(Calibrator, LateFramesAreNamed) {
+  const Scenario scenario = LivelyScenario(6.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  ASSERT_TRUE(calibrator->snapshot()->has_estimate) << calibrator->snapshot()->message;
+  // The gyro runs on for a quarter of a minute, then the camera's next frame arrives.
+  GyroSample later = s.recording.gyro.back();
+  later.stamp_ns += 15'000'000'000;
+  ASSERT_EQ(Add(calibrator.get(), later), AddResult::kAccepted);
+  const TrackPoint point = {1, 10.0, 10.0};
+  EXPECT_EQ(calibrator->AddTracks(s.recording.frames.back().stamp_ns + 33'000'000, &point, 1),
+            AddResult::kTooLate);
+}
+
+// Three producers and a reader at once; what comes out is what one thread would have made.
+TEST(Calibrator, ProducersAndReaderMayRunAtTheSameTime) {
+  const Scenario scenario = LivelyScenario(7.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const Recording& r = s.recording;
+  const auto calibrator = Make(OptionsFor(scenario));
+  std::atomic<bool> done{false};
+  std::atomic<int> refused{0};
+  std::thread gyro([&] {
+    for (const GyroSample& x : r.gyro) refused += Add(calibrator.get(), x) != AddResult::kAccepted;
+  });
+  std::thread accel([&] {
+    for (const AccelSample& x : r.accel)
+      refused += Add(calibrator.get(), x) != AddResult::kAccepted;
+  });
+  std::thread frames([&] {
+    for (size_t i = 0; i < r.frames.size(); ++i) {
+      refused += Add(calibrator.get(), r, i) != AddResult::kAccepted;
+    }
+  });
+  std::thread reader([&] {
+    uint64_t before = 0;
+    while (!done) {
+      const auto snapshot = calibrator->snapshot();
+      EXPECT_GE(snapshot->frames, before);  // snapshots do not go back
+      before = snapshot->frames;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  gyro.join();
+  accel.join();
+  frames.join();
+  EXPECT_TRUE(calibrator->WaitUntilIdle(120.0));
+  done = true;
+  reader.join();
+  EXPECT_EQ(refused, 0);
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  EXPECT_LT(Sigmas(snapshot->calibration.delay_s, s.truth.delay_s, snapshot->parameters[kDelay]),
+            5.0);
+}
+
+TEST(Calibrator, MayBeDestroyedWhileItWorks) {
+  const Scenario scenario = LivelyScenario(6.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), s.recording);
+  calibrator.reset();
+}
+
+TEST(Calibrator, SurvivesStreamsThatStopAndClocksThatJump) {
+  const Scenario scenario = LivelyScenario(7.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const Recording& r = s.recording;
+  const auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), r);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  ASSERT_TRUE(calibrator->snapshot()->has_estimate);
+  // The gyro falls silent; the camera goes on for 12 s.
+  int64_t stamp_ns = r.frames.back().stamp_ns;
+  const std::vector<TrackPoint> points = Points(r.tracks.back());
+  for (int i = 0; i < 360; ++i) {
+    stamp_ns += 33'000'000;
+    ASSERT_EQ(calibrator->AddTracks(stamp_ns, points.data(), points.size()), AddResult::kAccepted);
+  }
+  ASSERT_TRUE(calibrator->WaitUntilIdle(60.0));
+  EXPECT_EQ(calibrator->snapshot()->stage, Stage::kCollecting);
+  EXPECT_FALSE(calibrator->snapshot()->has_estimate);
+  EXPECT_FALSE(calibrator->snapshot()->ready);
+  // Both clocks jump by an hour, and all begins anew: an estimate comes again.
+  const int64_t jump_ns = 3'600'000'000'000;
+  Recording again = r;
+  for (auto& frame : again.frames) frame.stamp_ns += jump_ns;
+  for (auto& sample : again.gyro) sample.stamp_ns += jump_ns;
+  for (auto& sample : again.accel) sample.stamp_ns += jump_ns;
+  Feed(calibrator.get(), again);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  EXPECT_LT(Sigmas(snapshot->calibration.delay_s, s.truth.delay_s, snapshot->parameters[kDelay]),
+            5.0);
+}
+
+// Pictures instead of tracks: the sample of the repository is too long, 40 frames are enough to see
+// that they are tracked and counted.
+TEST(Calibrator, TakesPictures) {
+  Scenario scenario = LivelyScenario(1.3);
+  scenario.scene.kind = simulation::SceneKind::kRoom;
+  scenario.motion.speed_m_s = 0.3;
+  scenario.camera.width_px = 320;
+  scenario.camera.height_px = 240;
+  scenario.camera.focal_px = 290.0;
+  scenario.video.max_blur_samples = 4;
+  const Simulated s = simulation::SimulateSensors(scenario).value();
+  simulation::Renderer renderer(s, scenario);
+  const auto calibrator = Make(OptionsFor(scenario));
+  for (const GyroSample& sample : s.recording.gyro) {
+    ASSERT_EQ(Add(calibrator.get(), sample), AddResult::kAccepted);
+  }
+  const TrackPoint point = {1, 10.0, 10.0};
+  for (size_t i = 0; i < s.recording.frames.size(); ++i) {
+    cv::Mat picture = renderer.Render(i);
+    ASSERT_EQ(calibrator->AddImage(s.recording.frames[i].stamp_ns,
+                                   {picture.data, picture.cols, picture.rows, picture.step[0]}),
+              AddResult::kAccepted);
+    picture.setTo(0);  // it was copied
+  }
+  EXPECT_EQ(calibrator->AddTracks(s.recording.frames.back().stamp_ns + 1, &point, 1),
+            AddResult::kOutOfRange);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(60.0));
+  EXPECT_EQ(calibrator->snapshot()->frames, s.recording.frames.size());
+  EXPECT_EQ(calibrator->snapshot()->stage, Stage::kCollecting);  // 1.3 s are too short
+}
+
+TEST(Api, NamesAndVersion) {
+  EXPECT_STREQ(Version(), "0.1.0");
+  EXPECT_STREQ(ParameterName(kDelay), "delay_s");
+  EXPECT_STREQ(ParameterName(-1), "");
+  EXPECT_STREQ(ParameterName(kParameters), "");
+  EXPECT_STREQ(ToString(AddResult::kTooLate), "too late");
+  EXPECT_STREQ(ToString(Readiness::kReady), "ready");
+  EXPECT_STREQ(ToString(VinsVerdict::kNoAccelerometer), "no accelerometer");
+}
+
+}  // namespace
+}  // namespace camgyro::api
