@@ -7,6 +7,7 @@
 #include "estimator/calibrate.h"
 #include "tools/commands.h"
 #include "tools/recording_input.h"
+#include "tools/report/calibrate_report.h"
 #include "tools/result_files.h"
 #include "tools/summary.h"
 
@@ -71,7 +72,15 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   const bool attitudes = HasOnlyAttitudes(*recording);
   files.Add("trace.csv", TraceCsv(report->trace));
   files.Add("delay.csv", DelayCsv(report->start.curve));
-  files.Add("calibration.yaml", CalibrationYaml(*report, attitudes));
+  const std::string yaml = CalibrationYaml(*report, attitudes);
+  files.Add("calibration.yaml", yaml);
+  const Command command = CalibrateCommand();
+  const Result<std::string> html =
+      CalibrationReportHtml(*recording, *report,
+                            {CommandLineOf(command, arguments), DescribeRecording(*recording),
+                             FlagValues(command), yaml});
+  if (!html) return tl::unexpected(html.error());
+  files.Add("report.html", *html);
   if (Status written = files.Write(); !written) return written;
 
   std::printf("\n%s", ParameterTable(report->calibration, attitudes).c_str());
@@ -80,7 +89,8 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
                 StartLine(report->start).c_str(), QualityLine(*report, attitudes).c_str(),
                 TimeLine(*report, tracking->seconds, recording->frames.size()).c_str(),
                 Notes("note", report->notes).c_str(), Notes("doubt", report->doubts).c_str());
-    std::printf("written    %s/calibration.yaml, trace.csv, delay.csv\n", files.folder().c_str());
+    std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv\n",
+                files.folder().c_str());
   }
   return {};
 }

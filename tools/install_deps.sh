@@ -1,6 +1,7 @@
 #!/bin/bash
-# Installs what camgyro needs to build, test and run on Debian 12: only packages that are missing,
-# and without apt-get if none is. Needs root or sudo for that.
+# tools/install_deps.sh [PACKAGE...]: installs what camgyro needs to build, test and run on Debian
+# 12, and the packages named: only those that are missing, and without apt-get if none is. Needs
+# root or sudo for that.
 set -euo pipefail
 
 packages=(
@@ -10,6 +11,8 @@ packages=(
   libeigen3-dev libceres-dev libsuitesparse-dev libgflags-dev libgoogle-glog-dev
   libopencv-dev libavformat-dev libavcodec-dev libswscale-dev libavutil-dev
   libyaml-cpp-dev libexpected-dev libfast-float-dev
+  # charts of report.html
+  libjs-dygraphs
   # tests
   libgmock-dev libgtest-dev
   # tools/measure.py
@@ -17,7 +20,7 @@ packages=(
 )
 
 missing=()
-for package in "${packages[@]}"; do
+for package in "${packages[@]}" "$@"; do
   status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
   [[ $status == installed ]] || missing+=("$package")
 done
