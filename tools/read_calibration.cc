@@ -2,58 +2,209 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
-#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace camgyro {
 namespace {
 
-// Numbers of `section: key: value:`, which must be `count` of them.
-std::vector<double> Values(const YAML::Node& root, const char* section, const char* key,
-                           size_t count) {
-  const YAML::Node node = root[section][key]["value"];
-  const auto values =
-      count == 1 ? std::vector<double>{node.as<double>()} : node.as<std::vector<double>>();
-  for (const double value : values) {
-    if (!std::isfinite(value)) throw YAML::Exception(node.Mark(), "not a number");
+// Something wrong at a place of the file; caught in ReadCalibration.
+struct Complaint {
+  YAML::Mark mark;
+  std::string text;
+};
+
+// Quantities of one section of the file.
+class Section {
+ public:
+  Section(const YAML::Node& root, std::string name) : name_(std::move(name)), node_(root[name_]) {
+    if (node_ && !node_.IsMap()) Fail(node_, "", "expected a map of keys to values");
   }
-  if (values.size() != count) throw YAML::Exception(node.Mark(), "wrong number of values");
-  return values;
+
+  // The numbers of `key: {value: ...}` or `key: ...`; none if the key is absent.
+  std::vector<double> Numbers(const char* key, size_t count) const {
+    const YAML::Node value = Value(key);
+    if (!value) return {};
+    std::vector<double> numbers;
+    try {
+      numbers = value.IsSequence() ? value.as<std::vector<double>>()
+                                   : std::vector<double>{value.as<double>()};
+    } catch (const YAML::Exception&) {
+      Fail(value, key, "expected " + Count(count));
+    }
+    if (numbers.size() != count) {
+      Fail(value, key, "expected " + Count(count) + ", got " + std::to_string(numbers.size()));
+    }
+    for (const double number : numbers) {
+      if (!std::isfinite(number)) Fail(value, key, "expected a finite number");
+    }
+    return numbers;
+  }
+
+  double Number(const char* key, double absent) const {
+    const std::vector<double> numbers = Numbers(key, 1);
+    return numbers.empty() ? absent : numbers[0];
+  }
+
+  double Positive(const char* key, double absent) const {
+    const double number = Number(key, absent);
+    if (!(number > 0.0)) Fail(Value(key), key, "expected a number above zero");
+    return number;
+  }
+
+  YAML::Node Value(const char* key) const {
+    const YAML::Node node = Child(key);
+    return node && node.IsMap() ? node["value"] : node;
+  }
+
+  YAML::Node Child(const char* key) const {
+    return node_ ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+  }
+
+  [[noreturn]] void Fail(const YAML::Node& where, const std::string& key,
+                         const std::string& message) const {
+    const YAML::Node& nearest = where ? where : node_;
+    throw Complaint{nearest ? nearest.Mark() : YAML::Mark::null_mark(),
+                    name_ + ": " + (key.empty() ? "" : key + ": ") + message};
+  }
+
+ private:
+  static std::string Count(size_t count) {
+    return count == 1 ? "a number" : "a list of " + std::to_string(count) + " numbers";
+  }
+
+  std::string name_;
+  YAML::Node node_;
+};
+
+void ParseLens(const Section& camera, Calibration* c) {
+  for (const char* key : {"resolution", "focal_px"}) {
+    if (!camera.Value(key)) {
+      camera.Fail(YAML::Node(YAML::NodeType::Undefined), key,
+                  "is missing; expected a calibration.yaml of camgyro");
+    }
+  }
+  const double focal_px = camera.Positive("focal_px", 0.0);
+  const std::vector<double> size = camera.Numbers("resolution", 2);
+  for (const double pixels : size) {
+    if (!(pixels >= 1.0 && pixels <= 65536.0 && pixels == std::floor(pixels))) {
+      camera.Fail(camera.Value("resolution"), "resolution",
+                  "expected [width, height], whole numbers of pixels");
+    }
+  }
+  c->width_px = static_cast<int>(size[0]);
+  c->height_px = static_cast<int>(size[1]);
+  std::vector<double> principal = camera.Numbers("principal_px", 2);
+  if (principal.empty()) principal = {0.5 * (size[0] - 1.0), 0.5 * (size[1] - 1.0)};
+  c->lens =
+      MakePinhole(focal_px, {principal[0], principal[1]}, camera.Positive("aspect_ratio", 1.0));
+
+  const YAML::Node distortion = camera.Child("distortion");
+  if (!distortion) return;
+  const YAML::Node model = distortion.IsMap() ? distortion["model"] : distortion;
+  const auto name = model && model.IsScalar() ? model.as<std::string>() : std::string();
+  if (name == DistortionModelName(DistortionModel::kNone)) return;
+  if (name != DistortionModelName(DistortionModel::kRadTan)) {
+    camera.Fail(model, "distortion", "model: `" + name + "` is unknown, expected none or radtan");
+  }
+  c->distortion_model = DistortionModel::kRadTan;
+  const std::vector<double> k = camera.Numbers("distortion", 4);
+  if (k.empty()) camera.Fail(distortion, "distortion", "expected value: [k1, k2, p1, p2]");
+  std::copy(k.begin(), k.end(), c->lens.data() + kK1);
+}
+
+// Index of a parameter's name, or -1: parameters that Calibration does not hold may stand beside.
+int StateOf(const std::string& name) {
+  const auto& names = StateNames();
+  const auto found = std::find(names.begin(), names.end(), name);
+  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
+}
+
+std::vector<std::string> Names(const Section& section, const char* key) {
+  const YAML::Node node = section.Child(key);
+  if (!node) return {};
+  try {
+    return node.as<std::vector<std::string>>();
+  } catch (const YAML::Exception&) {
+    section.Fail(node, key, "expected a list of parameter names");
+  }
+}
+
+void ParseCovariance(const Section& section, Calibration* c) {
+  const std::vector<std::string> order = Names(section, "order");
+  const YAML::Node matrix = section.Child("matrix");
+  if (!matrix && order.empty()) return;
+  const std::string expected =
+      "expected a square matrix of finite numbers, a row for each name of order";
+  std::vector<std::vector<double>> rows;
+  try {
+    if (matrix) rows = matrix.as<std::vector<std::vector<double>>>();
+  } catch (const YAML::Exception&) {
+    section.Fail(matrix, "matrix", expected);
+  }
+  const auto bad_row = [&](const std::vector<double>& row) {
+    return row.size() != order.size() ||
+           !std::all_of(row.begin(), row.end(), [](double v) { return std::isfinite(v); });
+  };
+  if (rows.size() != order.size() || std::any_of(rows.begin(), rows.end(), bad_row)) {
+    section.Fail(matrix, "matrix", expected);
+  }
+  for (size_t i = 0; i < order.size(); ++i) {
+    for (size_t j = 0; j < order.size(); ++j) {
+      const int row = StateOf(order[i]), column = StateOf(order[j]);
+      if (row >= 0 && column >= 0) c->covariance(row, column) = rows[i][j];
+    }
+  }
 }
 
 Calibration Parse(const YAML::Node& root) {
-  Calibration c;
-  const auto resolution = root["camera"]["resolution"].as<std::vector<int>>();
-  c.width_px = resolution.at(0);
-  c.height_px = resolution.at(1);
-  const auto principal = Values(root, "camera", "principal_px", 2);
-  c.lens = MakePinhole(Values(root, "camera", "focal_px", 1)[0], {principal[0], principal[1]},
-                       Values(root, "camera", "aspect_ratio", 1)[0]);
-  const YAML::Node distortion = root["camera"]["distortion"];
-  if (distortion["model"].as<std::string>() == DistortionModelName(DistortionModel::kRadTan)) {
-    c.distortion_model = DistortionModel::kRadTan;
-    const auto k = Values(root, "camera", "distortion", 4);
-    for (int i = 0; i < 4; ++i) c.lens[kK1 + i] = k[static_cast<size_t>(i)];
-  } else if (distortion["model"].as<std::string>() != DistortionModelName(DistortionModel::kNone)) {
-    throw YAML::Exception(distortion.Mark(), "unknown distortion model");
+  if (!root.IsMap()) {
+    throw Complaint{YAML::Mark::null_mark(), "expected the keys of a calibration.yaml of camgyro"};
   }
-  c.readout_s = Values(root, "shutter", "readout_s", 1)[0];
-  c.delay_s = Values(root, "clock", "delay_s", 1)[0];
-  const auto bias = Values(root, "gyro", "bias_rad_s", 3);
-  c.bias_gyro_rad_s = {bias[0], bias[1], bias[2]};
-  const auto q = Values(root, "extrinsics", "q_gyro_cam_wxyz", 4);
-  c.q_gyro_cam = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+  Calibration c;
+  ParseLens(Section(root, "camera"), &c);
+  c.readout_s = Section(root, "shutter").Number("readout_s", 0.0);
+  c.delay_s = Section(root, "clock").Number("delay_s", 0.0);
+  const std::vector<double> bias = Section(root, "gyro").Numbers("bias_rad_s", 3);
+  if (!bias.empty()) c.bias_gyro_rad_s = {bias[0], bias[1], bias[2]};
+  const Section extrinsics(root, "extrinsics");
+  const std::vector<double> q = extrinsics.Numbers("q_gyro_cam_wxyz", 4);
+  if (!q.empty()) {
+    c.q_gyro_cam = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    // Ten digits are written; an entry that is off by 1e-3 was mistyped.
+    if (std::abs(c.q_gyro_cam.norm() - 1.0) > 1e-3) {
+      extrinsics.Fail(extrinsics.Value("q_gyro_cam_wxyz"), "q_gyro_cam_wxyz",
+                      "expected a quaternion of norm 1");
+    }
+    c.q_gyro_cam.normalize();
+  }
+  ParseCovariance(Section(root, "covariance"), &c);
+  c.determined.fill(true);
+  for (const std::string& name : Names(Section(root, "quality"), "unobservable")) {
+    const int index = StateOf(name);
+    if (index >= 0) c.determined[static_cast<size_t>(index)] = false;
+  }
   return c;
+}
+
+std::string Place(const std::string& path, const YAML::Mark& mark) {
+  return mark.is_null() ? path : path + ":" + std::to_string(mark.line + 1);
 }
 
 }  // namespace
 
-Result<Calibration> ReadCalibration(const std::string& file) {
+Result<Calibration> ReadCalibration(const std::string& path) {
   try {
-    return Parse(YAML::LoadFile(file));
-  } catch (const std::exception& error) {  // yaml-cpp's, and a resolution that is too short
-    return BadInput(file + ": expected a calibration.yaml of camgyro with a lens: " + error.what());
+    return Parse(YAML::LoadFile(path));
+  } catch (const Complaint& complaint) {
+    return BadInput(Place(path, complaint.mark) + ": " + complaint.text);
+  } catch (const YAML::BadFile&) {
+    return BadInput(path + ": cannot be opened for reading; expected a calibration.yaml");
+  } catch (const YAML::Exception& error) {
+    return BadInput(Place(path, error.mark) + ": not valid YAML: " + error.msg);
   }
 }
 

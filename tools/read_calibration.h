@@ -9,9 +9,15 @@
 
 namespace camgyro {
 
-// Values only: the covariance stays zero. Errors: kBadInput naming file and key; a calibration from
-// attitudes has no lens and is refused.
-Result<Calibration> ReadCalibration(const std::string& file);
+// Reads what `calibrate` writes, and a simulator's truth.yaml, which has values without sigmas.
+// Needed are `resolution` and `focal_px` of `camera`. The rest may be absent: the principal point
+// is then the middle of the picture, the aspect ratio 1, a rotation none, everything else zero. A
+// quantity is `{value: V}` or just V. `determined` is true but for what `quality: unobservable`
+// names. Keys that are not of Calibration (effects, sigmas beside the covariance) are ignored.
+//
+// Errors: kBadInput naming file, line and key: not YAML; wrong type, length or range; not finite (a
+// calibration from attitudes has no lens); an unknown distortion model.
+Result<Calibration> ReadCalibration(const std::string& path);
 
 }  // namespace camgyro
 

@@ -1,0 +1,143 @@
+// calibration.yaml and truth.yaml read back; what is wrong is refused with file, line and key.
+#include "tools/read_calibration.h"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimator/calibrate.h"
+#include "tests/measured_data.h"
+#include "tests/tools/run_camgyro.h"
+#include "tools/result_files.h"
+
+namespace camgyro {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class ReadCalibrationTest : public CamgyroTest {
+ protected:
+  Result<Calibration> Read(const std::string& text) const {
+    std::ofstream(Path("c.yaml")) << text;
+    return ReadCalibration(Path("c.yaml"));
+  }
+};
+
+TEST_F(ReadCalibrationTest, WhatWasWrittenIsWhatIsRead) {
+  CalibrationReport report;
+  Calibration& c = report.calibration;
+  c.width_px = 320;
+  c.height_px = 240;
+  c.distortion_model = DistortionModel::kRadTan;
+  c.lens << 290.125, 161.5, 118.25, 1.0625, -0.25, 0.0625, 0.5e-3, -0.25e-3;
+  c.readout_s = -0.0125;
+  c.delay_s = 465.0625;
+  c.bias_gyro_rad_s << 0.5, -0.25, 0.125;
+  c.q_gyro_cam = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  for (int i = 0; i < kStateSize; ++i) {
+    for (int j = 0; j < kStateSize; ++j) c.covariance(i, j) = (i == j ? 64.0 : 0.0) + i * j;
+  }
+  c.determined.fill(true);
+  c.determined[kStateReadout] = c.determined[kStateRotation + 2] = false;
+  const Result<Calibration> read = Read(CalibrationYaml(report, /*attitudes=*/false));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->width_px, 320);
+  EXPECT_EQ(read->height_px, 240);
+  EXPECT_EQ(read->distortion_model, DistortionModel::kRadTan);
+  EXPECT_EQ(read->lens, c.lens);
+  EXPECT_LT(Difference(*read, c).norm(), 1e-12);
+  EXPECT_EQ(read->covariance, c.covariance);
+  EXPECT_EQ(read->determined, c.determined);
+
+  const Result<Calibration> attitudes = Read(CalibrationYaml(report, /*attitudes=*/true));
+  ASSERT_FALSE(attitudes);
+  EXPECT_THAT(attitudes.error().message, HasSubstr("camera: focal_px: expected a finite number"));
+}
+
+TEST_F(ReadCalibrationTest, AbsentSectionsKeepDefaults) {
+  const Result<Calibration> read = Read("camera: {resolution: [64, 48], focal_px: 50}\n");
+  ASSERT_TRUE(read) << read.error().message;
+  const LensParameters pinhole = MakePinhole(50.0, {31.5, 23.5});
+  EXPECT_EQ(read->lens, pinhole);
+  EXPECT_EQ(read->distortion_model, DistortionModel::kNone);
+  EXPECT_EQ(read->readout_s, 0.0);
+  EXPECT_EQ(read->delay_s, 0.0);
+  EXPECT_EQ(read->q_gyro_cam.w(), 1.0);
+  EXPECT_EQ(read->covariance, StateCovariance::Zero());
+}
+
+TEST_F(ReadCalibrationTest, TruthOfASimulation) {
+  Simulate("duration_s: 0.2\ncamera: {focal_px: 300, delay_s: 0.0625}\n", "a");
+  const Result<Calibration> read = ReadCalibration(Path("a/truth.yaml"));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->lens[kFocal], 300.0);
+  EXPECT_EQ(read->delay_s, 0.0625);
+}
+
+// The values that stand in the truth.yaml beside the recording.
+TEST_F(ReadCalibrationTest, TruthOfAnotherSimulator) {
+  const auto path = MeasuredData("ov_handheld_gs/truth.yaml");
+  if (!path) GTEST_SKIP() << "no ov_handheld_gs in $CAMGYRO_DATA";
+  const Result<Calibration> read = ReadCalibration(*path);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->distortion_model, DistortionModel::kRadTan);
+  EXPECT_THAT(std::vector<double>(read->lens.data(), read->lens.data() + kLensSize),
+              ElementsAre(457.296, 367.215, 248.375, 1.0029696, -0.28340811, 0.07395907, 0.00019359,
+                          0.00001762));
+  EXPECT_EQ(read->delay_s, 0.03);
+}
+
+// Parameters that Calibration does not hold may stand between those that it holds.
+TEST_F(ReadCalibrationTest, CovarianceGoesByName) {
+  const Result<Calibration> read = Read(
+      "camera: {resolution: [64, 48], focal_px: 50}\n"
+      "covariance: {order: [delay_s, gyro_scale_x, focal_px], matrix: [[4, 7, 2], [7, 9, 7], [2, "
+      "7, 16]]}\n");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->covariance(kStateDelay, kStateDelay), 4.0);
+  EXPECT_EQ(read->covariance(kStateDelay, kStateFocal), 2.0);
+  EXPECT_EQ(read->covariance(kStateFocal, kStateFocal), 16.0);
+  EXPECT_EQ(read->covariance.cwiseAbs().sum(), 4.0 + 16.0 + 2.0 * 2.0);
+}
+
+TEST_F(ReadCalibrationTest, RefusesWithFileLineAndKey) {
+  const std::string camera = "camera:\n  resolution: [64, 48]\n  focal_px: {value: 50, sigma: 1}\n";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"", "c.yaml: expected the keys of a calibration.yaml"},
+      {"shutter: {readout_s: 1}\n", "c.yaml: camera: resolution: is missing"},
+      {"camera:\n  resolution: [64, 48]\n", "c.yaml:2: camera: focal_px: is missing"},
+      {"camera: {resolution: [64], focal_px: 5}", "c.yaml:1: camera: resolution: expected a list"},
+      {"camera: {resolution: [6.5, 4], focal_px: 5}", "resolution: expected [width, height]"},
+      {"camera:\n  resolution: [64, 48]\n  focal_px: {value: -50}\n",
+       "c.yaml:3: camera: focal_px: expected a number above zero"},
+      {"camera: 7\n", "c.yaml:1: camera: expected a map"},
+      {camera + "  distortion: {model: kb4, value: [0, 0, 0, 0]}\n",
+       "c.yaml:4: camera: distortion: model: `kb4` is unknown, expected none or radtan"},
+      {camera + "  distortion:\n    model: radtan\n    value: [0, 0, 0]\n",
+       "c.yaml:6: camera: distortion: expected a list of 4 numbers, got 3"},
+      {camera + "  distortion: {model: radtan}\n", "distortion: expected value: [k1, k2, p1, p2]"},
+      {camera + "shutter:\n  readout_s: {value: fast}\n",
+       "c.yaml:5: shutter: readout_s: expected a number"},
+      {camera + "clock: {delay_s: {value: .inf}}\n", "clock: delay_s: expected a finite number"},
+      {camera + "extrinsics: {q_gyro_cam_wxyz: [1, 1, 0, 0]}\n",
+       "c.yaml:4: extrinsics: q_gyro_cam_wxyz: expected a quaternion of norm 1"},
+      {camera + "covariance:\n  order: [focal_px]\n  matrix: [[1, 2]]\n",
+       "c.yaml:6: covariance: matrix: expected a square matrix"},
+      {camera + "quality: {unobservable: {a: 1}}\n", "quality: unobservable: expected a list"},
+      {"camera: {resolution: [64, 48\n", "c.yaml:2: not valid YAML"},
+  };
+  for (const auto& [text, complaint] : cases) {
+    const Result<Calibration> read = Read(text);
+    ASSERT_FALSE(read) << text;
+    EXPECT_EQ(read.error().kind, ErrorKind::kBadInput);
+    EXPECT_THAT(read.error().message, HasSubstr(complaint));
+  }
+  EXPECT_THAT(ReadCalibration(Path("nowhere.yaml")).error().message,
+              HasSubstr("nowhere.yaml: cannot be opened"));
+}
+
+}  // namespace
+}  // namespace camgyro
