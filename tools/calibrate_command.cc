@@ -13,7 +13,7 @@
 
 DEFINE_string(out, "",
               "folder to write into, made if absent; without: ./calibration (calibrate), the "
-              "recording (track), no files (delay)");
+              "recording (track), no files (delay); stabilize: the video, .mp4, .mov or .mkv");
 DEFINE_string(estimator, "window", "online estimator: window");
 DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");
 DEFINE_bool(refine, true,

@@ -13,6 +13,7 @@ Command CalibrateCommand();
 Command DelayCommand();
 Command TrackCommand();
 Command SimulateCommand();
+Command StabilizeCommand();
 Command HelpCommand();
 
 // All of them, in the order of the help.

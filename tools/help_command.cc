@@ -10,7 +10,8 @@ constexpr size_t kUsageWidth = 40;  // the longest is simulate's
 }  // namespace
 
 std::vector<Command> AllCommands() {
-  return {CalibrateCommand(), DelayCommand(), TrackCommand(), SimulateCommand(), HelpCommand()};
+  return {CalibrateCommand(), DelayCommand(),     TrackCommand(),
+          SimulateCommand(),  StabilizeCommand(), HelpCommand()};
 }
 
 Result<Command> FindCommand(const std::string& name) {
