@@ -1,4 +1,4 @@
-# Run at build time (cmake -P): writes OUTPUT from TEMPLATE with VERSION and the commit of
+# Run at build time (cmake -P): writes OUTPUT from TEMPLATE with VERSION, PLATFORM and the commit of
 # SOURCE_DIR. The file is touched only if that changed.
 execute_process(COMMAND git describe --always --dirty --abbrev=12 --exclude=*
                 WORKING_DIRECTORY ${SOURCE_DIR} OUTPUT_VARIABLE commit RESULT_VARIABLE failed

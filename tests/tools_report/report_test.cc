@@ -20,12 +20,12 @@ using testing::HasSubstr;
 using testing::Not;
 
 constexpr char kHandheld[] = R"(
-duration_s: 4
+duration_s: 3
 camera: {resolution: [320, 240], focal_px: 290, rate_hz: 20}
 tracks: {count: 50, noise_px: 0.2}
 )";
 constexpr char kSlow[] = R"(
-duration_s: 4
+duration_s: 2
 motion: {kind: panning}
 camera: {resolution: [320, 240], focal_px: 290, rate_hz: 20}
 tracks: {count: 50, noise_px: 0.5}

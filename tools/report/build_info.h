@@ -7,6 +7,8 @@ namespace camgyro {
 extern const char* const kVersion;
 // The commit it was built from, with "-dirty" if files differed from it; "unknown" without git.
 extern const char* const kGitCommit;
+// System, processor and kind of build.
+extern const char* const kPlatform;
 
 }  // namespace camgyro
 

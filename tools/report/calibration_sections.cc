@@ -1,10 +1,16 @@
 #include "tools/report/calibration_sections.h"
 
+extern "C" {
+#include <libavutil/avutil.h>
+}
+
+#include <ceres/version.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <opencv2/core/version.hpp>
 
 #include "core/time.h"
 #include "estimator/start/axis_permutation.h"
@@ -299,7 +305,7 @@ ReportSection FitSection(const CalibrationReport& report, bool attitudes) {
         {{"disagreement of the two halves, chi2 per parameter (1 expected)", "", 0.0},
          {FormatText("%.2f", report.halves_chi2), "", 0.0}});
   }
-  std::string html = TableHtml(table) + TableHtml(noise);
+  std::string html = (table.rows.empty() ? "" : TableHtml(table)) + TableHtml(noise);
   html += Paragraph(
       report.unseen
           ? "Not seen: each half of the recording under the fit of the other half. A model that "
@@ -311,9 +317,13 @@ ReportSection FitSection(const CalibrationReport& report, bool attitudes) {
 }
 
 ReportSection ReproductionSection(const RunInfo& run) {
-  std::string text = run.command_line + "\n\nrecording   " + run.recording + "\ncamgyro     " +
-                     kVersion + ", commit " + kGitCommit + "\ncompiler    " + __VERSION__ +
-                     "\noptions    ";
+  std::string text =
+      run.command_line + "\n\nrecording   " + run.recording + "\ncamgyro     " + kVersion +
+      ", commit " + kGitCommit + "\nbuilt for   " + kPlatform + ", compiler " + __VERSION__ +
+      "\nlibraries   Ceres " + CERES_VERSION_STRING + ", OpenCV " + CV_VERSION + ", FFmpeg " +
+      av_version_info() + ", " +
+      FormatText("Eigen %d.%d.%d", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION) +
+      "\noptions    ";
   for (const auto& [name, value] : run.options) text += " --" + name + "=" + value;
   return {"reproduction", "To reproduce this",
           "<pre>" + EscapeHtml(text) + "</pre>\n" +
