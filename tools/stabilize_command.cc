@@ -65,7 +65,8 @@ std::string RegistrationRow(const char* name, double recorded, const double* uns
   return Text((std::string("  ") + name + " %8.3f px").c_str(), recorded) +
          (unsynchronised != nullptr ? Text("      %8.3f px", *unsynchronised)
                                     : "               - ") +
-         Text("   %8.3f px   (%.1f times less than recorded)\n", calibrated, recorded / calibrated);
+         Text("   %8.3f px   (as recorded is %.1f times that)\n", calibrated,
+              recorded / calibrated);
 }
 
 std::string Summary(const StabilizeReport& report) {

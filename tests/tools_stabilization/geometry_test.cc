@@ -153,6 +153,19 @@ TEST_F(FrameWarpTest, TurnsEachRowByItsOwnTime) {
   }
 }
 
+// A still camera without distortion, wherever its principal point is.
+TEST(VirtualCamera, ZoomsAboutTheCentreOfThePicture) {
+  Calibration c = Pinhole();
+  c.lens[kCx] = 100.0;
+  const CameraPath path(TurningAboutY([](double) { return 0.0; }), c);
+  const Eigen::Quaterniond own(path.R_world_cam(3, 0.0));
+  const FrameWarp same(path, c, 3, own, VirtualCamera(c, 640, 480, 1.0));
+  EXPECT_LT((*same.ToSource({30.0, 400.0}) - Eigen::Vector2d(30.0, 400.0)).norm(), 1e-9);
+  const FrameWarp twice(path, c, 3, own, VirtualCamera(c, 640, 480, 2.0));
+  EXPECT_LT((*twice.ToSource({319.5, 239.5}) - Eigen::Vector2d(319.5, 239.5)).norm(), 1e-9);
+  EXPECT_LT((*twice.ToSource({419.5, 239.5}) - Eigen::Vector2d(369.5, 239.5)).norm(), 1e-9);
+}
+
 TEST_F(FrameWarpTest, MapsAreTheWarp) {
   const FrameWarp warp = Warp(1.1);
   cv::Mat x, y;

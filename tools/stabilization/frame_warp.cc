@@ -18,16 +18,19 @@ VirtualCamera::VirtualCamera(const Calibration& calibration, int width, int heig
     : width_px(width),
       height_px(height),
       fx_px(zoom * calibration.lens[kFocal] * calibration.lens[kAspect]),
-      fy_px(zoom * calibration.lens[kFocal]) {}
+      fy_px(zoom * calibration.lens[kFocal]) {
+  const Eigen::Vector2d centre(0.5 * (width - 1), 0.5 * (height - 1));
+  principal_px = centre + zoom * (calibration.lens.segment<2>(kCx) - centre);
+}
 
 Eigen::Vector3d VirtualCamera::Ray(const Eigen::Vector2d& px) const {
-  return {(px.x() - 0.5 * (width_px - 1)) / fx_px, (px.y() - 0.5 * (height_px - 1)) / fy_px, 1.0};
+  return {(px.x() - principal_px.x()) / fx_px, (px.y() - principal_px.y()) / fy_px, 1.0};
 }
 
 std::optional<Eigen::Vector2d> VirtualCamera::Project(const Eigen::Vector3d& ray) const {
   if (!(ray.z() > 1e-3 * ray.norm())) return std::nullopt;
-  return Eigen::Vector2d(fx_px * ray.x() / ray.z() + 0.5 * (width_px - 1),
-                         fy_px * ray.y() / ray.z() + 0.5 * (height_px - 1));
+  return Eigen::Vector2d(fx_px * ray.x() / ray.z() + principal_px.x(),
+                         fy_px * ray.y() / ray.z() + principal_px.y());
 }
 
 FrameWarp::FrameWarp(const CameraPath& path, const Calibration& calibration, int frame,

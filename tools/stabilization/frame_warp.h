@@ -13,11 +13,12 @@
 
 namespace camgyro {
 
-// The virtual camera: a pinhole with the calibrated focal length (and aspect ratio), zoomed, and
-// the picture's size and centre.
+// The virtual camera: the calibrated one without its distortion, zoomed about the centre of the
+// picture, so that at zoom 1 and from the camera's own orientation the picture stays where it is.
 struct VirtualCamera {
   int width_px = 0, height_px = 0;
   double fx_px = 0.0, fy_px = 0.0;
+  Eigen::Vector2d principal_px;
 
   VirtualCamera(const Calibration& calibration, int width_px, int height_px, double zoom);
   Eigen::Vector3d Ray(const Eigen::Vector2d& px) const;
