@@ -5,8 +5,10 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <memory>
 #include <string>
 
+#include "core/effects/catalogue.h"
 #include "core/lens.h"
 
 namespace camgyro {
@@ -44,6 +46,19 @@ struct Calibration {
   // Parameters that the data informed: sigma well below the prior's.
   std::array<bool, kStateSize> determined{};
 
+  // Effects of the catalogue in the model, beside the parameters above; null: none.
+  std::shared_ptr<const EffectSet> effects;
+  Eigen::VectorXd effect_values;      // effects->size()
+  Eigen::MatrixXd effect_covariance;  // of effect_values
+
+  // The lens with the effects that are a constant part of it (distortion, aspect ratio).
+  LensParameters FullLens() const {
+    return effects ? effects->ConstantLens(lens, effect_values) : lens;
+  }
+  PairEffects pair_effects() const {
+    return effects && effects->size() > 0 ? PairEffects{effects.get(), effect_values.data()}
+                                          : PairEffects();
+  }
   StateVector sigma() const { return covariance.diagonal().cwiseSqrt(); }
 };
 

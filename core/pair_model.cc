@@ -1,23 +1,73 @@
 #include "core/pair_model.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "core/so3.h"
 
 namespace camgyro {
 
+std::pair<double, double> ExposureSpan(const ShutterParameters& shutter,
+                                       const Eigen::Vector2d& size_px, const PairEffects& effects,
+                                       const FrameTime& frame_a, const FrameTime& frame_b) {
+  double first = std::numeric_limits<double>::infinity(), last = -first;
+  EffectSet::Change change;
+  for (const FrameTime& frame : {frame_a, frame_b}) {
+    for (const Eigen::Vector2d& part : {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(1.0, 0.0),
+                                        Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(1.0, 1.0)}) {
+      const Eigen::Vector2d px = part.cwiseProduct(size_px);
+      double time_s = RowTimeGyroS(frame.stamp_s, shutter, part.y(), 1.0);
+      if (effects.set != nullptr) {
+        effects.set->ChangeObservation({px, size_px, frame}, &change);
+        time_s += change.time.row(0).dot(
+            Eigen::Map<const Eigen::VectorXd>(effects.values, effects.set->size()));
+      }
+      first = std::min(first, time_s);
+      last = std::max(last, time_s);
+    }
+  }
+  return {first, last};
+}
+
+Eigen::Vector3d TrueRate(const PairEffects& effects, double time_gyro_s,
+                         const Eigen::Vector3d& reading_less_bias) {
+  if (effects.set == nullptr) return reading_less_bias;
+  const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
+  Eigen::Matrix3Xd columns(3, effects.set->size());
+  Eigen::Vector3d rate = reading_less_bias;
+  for (int iteration = 0; iteration < 3; ++iteration) {  // the change depends on the rate, weakly
+    effects.set->ChangeRate(time_gyro_s, rate, columns);
+    rate = reading_less_bias - columns * values;
+  }
+  return rate;
+}
+
 bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
                      const ShutterParameters& shutter, const Eigen::Matrix3d& R_gyro_cam,
-                     const RotationChain& chain, double frame_time_s, double height_px,
-                     const Eigen::Vector2d& px, Bearing* b, bool derivatives) {
-  if (!lens_model.Unproject(px, lens, &b->lens_ray, derivatives)) return false;
+                     const RotationChain& chain, const FrameTime& frame,
+                     const Eigen::Vector2d& size_px, const Eigen::Vector2d& px,
+                     const PairEffects& effects, Bearing* b, bool derivatives) {
+  const double height_px = size_px.y();
   b->row_fraction = px.y() / height_px;
-  b->line_delay_s = shutter[kReadout] / height_px;
-  b->rotation = chain.At(RowTimeGyroS(frame_time_s, shutter, px.y(), height_px));
+  b->J_time_px << 0.0, shutter[kReadout] / height_px;
+  LensParameters lens_here = lens;
+  double time_s = RowTimeGyroS(frame.stamp_s, shutter, px.y(), height_px);
+  if (effects.set != nullptr) {
+    effects.set->ChangeObservation({px, size_px, frame}, &b->change);
+    const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
+    lens_here += b->change.lens * values;
+    const Eigen::Vector3d change = b->change.time * values;
+    time_s += change[0];
+    b->J_time_px += change.tail<2>().transpose();
+  }
+  if (!lens_model.Unproject(px, lens_here, &b->lens_ray, derivatives)) return false;
+  b->rotation = chain.At(time_s);
   b->R_ref_cam = b->rotation.R_ref_gyro * R_gyro_cam;
   b->omega_cam_rad_s = R_gyro_cam.transpose() * b->rotation.omega_gyro_rad_s;
   b->ray_ref = b->R_ref_cam * b->lens_ray.ray;
-  // A pixel further down is exposed line_delay later, when the camera has turned a little more.
-  Eigen::Matrix<double, 3, 2> J_cam = b->lens_ray.J_ray_px;
-  J_cam.col(1) += b->line_delay_s * b->omega_cam_rad_s.cross(b->lens_ray.ray);
+  // A pixel further down is exposed later, when the camera has turned a little more.
+  const Eigen::Matrix<double, 3, 2> J_cam =
+      b->lens_ray.J_ray_px + b->omega_cam_rad_s.cross(b->lens_ray.ray) * b->J_time_px;
   b->J_ray_px = b->R_ref_cam * J_cam;
   return true;
 }
@@ -30,17 +80,18 @@ void Backpropagate(const Bearing& b, const RotationChain& chain, double height_p
   // In the camera frame at the time of exposure.
   const Eigen::Vector3d by_ray_cam = b.R_ref_cam.transpose() * by_ray;
   const Eigen::Matrix<double, 3, 2> by_J_cam = b.R_ref_cam.transpose() * by_J_ray_px;
-  const Eigen::Vector3d by_J1 = by_J_cam.col(1);
+  const Eigen::Vector3d by_J_time = by_J_cam * b.J_time_px.transpose();  // by omega x ray
 
   // Lens: through the ray (which also enters the row-time part of J) and through J_ray_px.
-  const Eigen::Vector3d by_lens_ray = by_ray_cam + b.line_delay_s * by_J1.cross(omega);
-  gradient->by_lens += by_lens_ray.transpose() * b.lens_ray.J_ray_lens;
+  const Eigen::Vector3d by_lens_ray = by_ray_cam + by_J_time.cross(omega);
+  Eigen::Matrix<double, 1, kLensSize> by_lens = by_lens_ray.transpose() * b.lens_ray.J_ray_lens;
   for (int k = 0; k < kLensSize; ++k) {
-    gradient->by_lens[k] += b.lens_ray.J_ray_px_lens[k].cwiseProduct(by_J_cam).sum();
+    by_lens[k] += b.lens_ray.J_ray_px_lens[k].cwiseProduct(by_J_cam).sum();
   }
+  gradient->by_lens += by_lens;
 
   // q_gyro_cam, right perturbation: ray and J_ray_px turn in the camera frame, omega_gyro stays.
-  const Eigen::Vector3d by_J0 = by_J_cam.col(0);
+  const Eigen::Vector3d by_J0 = by_J_cam.col(0), by_J1 = by_J_cam.col(1);
   const Eigen::Vector3d J0 = b.lens_ray.J_ray_px.col(0), J1 = b.lens_ray.J_ray_px.col(1);
   gradient->by_rotation += (ray.cross(by_lens_ray) + J0.cross(by_J0) + J1.cross(by_J1)).transpose();
 
@@ -48,16 +99,22 @@ void Backpropagate(const Bearing& b, const RotationChain& chain, double height_p
   const Eigen::Vector3d by_phi = b.ray_ref.cross(by_ray) +
                                  b.J_ray_px.col(0).cross(by_J_ray_px.col(0)) +
                                  b.J_ray_px.col(1).cross(by_J_ray_px.col(1));
-  const Eigen::Vector3d by_omega_cam = b.line_delay_s * ray.cross(by_J1);
+  const Eigen::Vector3d by_omega_cam = ray.cross(by_J_time);
   const Eigen::Matrix3d R_gyro_cam = b.rotation.R_ref_gyro.transpose() * b.R_ref_cam;
   const Eigen::Vector3d by_omega = R_gyro_cam * by_omega_cam;
 
   // Time of exposure, then delay and readout; the readout also scales the row-time part of J.
   const double by_time =
       by_phi.dot(b.rotation.PhiPerSecond()) + by_omega.dot(b.rotation.alpha_gyro_rad_s2);
+  const Eigen::RowVector2d by_slope = omega.cross(ray).transpose() * by_J_cam;
   gradient->by_shutter[kDelay] += by_time;
-  gradient->by_shutter[kReadout] +=
-      by_time * b.row_fraction + by_J1.dot(omega.cross(ray)) / height_px;
+  gradient->by_shutter[kReadout] += by_time * b.row_fraction + by_slope.y() / height_px;
+
+  if (b.change.lens.cols() > 0) {
+    if (gradient->by_effects.size() == 0) gradient->by_effects.setZero(b.change.lens.cols());
+    gradient->by_effects += by_lens * b.change.lens +
+                            Eigen::RowVector3d(by_time, by_slope.x(), by_slope.y()) * b.change.time;
+  }
 
   chain.AddRateGradient(b.rotation, by_phi, by_omega, by_rates);
 }

@@ -5,7 +5,9 @@
 #define CAMGYRO_CORE_PAIR_MODEL_H_
 
 #include <Eigen/Core>
+#include <utility>
 
+#include "core/effects/catalogue.h"
 #include "core/lens.h"
 #include "core/rotation_chain.h"
 
@@ -23,6 +25,15 @@ inline double RowTimeGyroS(double frame_time_s, const ShutterParameters& shutter
   return frame_time_s + shutter[kDelay] + shutter[kReadout] * v_px / height_px;
 }
 
+// First and last time on the gyro clock at which two frames are exposed.
+std::pair<double, double> ExposureSpan(const ShutterParameters& shutter,
+                                       const Eigen::Vector2d& size_px, const PairEffects& effects,
+                                       const FrameTime& frame_a, const FrameTime& frame_b);
+
+// The true rate behind a gyro reading, less its bias, in view of the effects [rad/s].
+Eigen::Vector3d TrueRate(const PairEffects& effects, double time_gyro_s,
+                         const Eigen::Vector3d& reading_less_bias);
+
 // A pixel seen from the reference orientation of its pair (the gyro frame at the first rate).
 struct Bearing {
   Eigen::Vector3d ray_ref;               // R_ref_gyro(t) R_gyro_cam ray_cam
@@ -33,8 +44,9 @@ struct Bearing {
   RotationChain::State rotation;
   Eigen::Matrix3d R_ref_cam;
   Eigen::Vector3d omega_cam_rad_s;
-  double line_delay_s = 0.0;
-  double row_fraction = 0.0;  // v / h
+  Eigen::RowVector2d J_time_px;  // of the time of exposure [s/px]
+  double row_fraction = 0.0;     // v / h
+  EffectSet::Change change;      // empty without effects
 };
 
 // Derivatives of one scalar by the parameters of a pair; rates are added by the caller's chain.
@@ -43,14 +55,28 @@ struct PairGradient {
   Eigen::Matrix<double, 1, kShutterSize> by_shutter =
       Eigen::Matrix<double, 1, kShutterSize>::Zero();
   Eigen::RowVector3d by_rotation = Eigen::RowVector3d::Zero();  // right perturbation of q_gyro_cam
+  Eigen::RowVectorXd by_effects;  // sized by the first bearing that has effects
 };
 
-// False where the lens has no ray for this pixel. Backpropagate needs `derivatives`.
+// False where the lens has no ray for this pixel. size_px: width, height of the picture.
+// Backpropagate needs `derivatives`.
 [[nodiscard]] bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
                                    const ShutterParameters& shutter,
                                    const Eigen::Matrix3d& R_gyro_cam, const RotationChain& chain,
-                                   double frame_time_s, double height_px, const Eigen::Vector2d& px,
+                                   const FrameTime& frame, const Eigen::Vector2d& size_px,
+                                   const Eigen::Vector2d& px, const PairEffects& effects,
                                    Bearing* bearing, bool derivatives = true);
+
+// The same without effects.
+[[nodiscard]] inline bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
+                                          const ShutterParameters& shutter,
+                                          const Eigen::Matrix3d& R_gyro_cam,
+                                          const RotationChain& chain, double frame_time_s,
+                                          double height_px, const Eigen::Vector2d& px,
+                                          Bearing* bearing, bool derivatives = true) {
+  return EvaluateBearing(lens_model, lens, shutter, R_gyro_cam, chain, FrameTime{frame_time_s},
+                         Eigen::Vector2d(0.0, height_px), px, PairEffects(), bearing, derivatives);
+}
 
 // Adds to `gradient` and `by_rates` (3 x chain.size()) the derivative of a scalar, given its
 // derivatives by ray_ref and by J_ray_px of one bearing.

@@ -199,6 +199,12 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   Calibration estimate = prior;
   estimate.bias_gyro_rad_s = start->bias_gyro_rad_s;
   if (start->focal && start->focal->determined) estimate.lens[kFocal] = start->focal->value_px;
+  if (!options.effects.empty()) {
+    Result<EffectSet> effects = MakeEffects(options.effects, MakeEffectSetup(recording, prior));
+    if (!effects) return tl::unexpected(effects.error());
+    estimate.effect_values = Eigen::VectorXd::Zero(effects->size());
+    estimate.effects = std::make_shared<const EffectSet>(std::move(*effects));
+  }
   PairGraphOptions graph_options = options.window.graph;
   graph_options.residual = options.residual;
   graph_options.match_noise = recording.match_noise;
@@ -226,8 +232,8 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
         }
       }
       if (window.AddPair(recording.frames[static_cast<size_t>(pair.frame_a)].stamp_ns,
-                         recording.frames[static_cast<size_t>(pair.frame_b)].stamp_ns,
-                         pair.matches) != AddResult::kAccepted) {
+                         recording.frames[static_cast<size_t>(pair.frame_b)].stamp_ns, pair.matches,
+                         pair.exposure_a_s, pair.exposure_b_s) != AddResult::kAccepted) {
         return BadInput("frames " + std::to_string(pair.frame_a) + " and " +
                         std::to_string(pair.frame_b) +
                         ": the stamp repeats or goes back, or a pixel is not finite");
@@ -304,6 +310,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     report.halves_chi2 = halves_chi2;
     if (halves_chi2 > kHalvesLimit) {
       report.calibration.covariance *= halves_chi2;
+      report.calibration.effect_covariance *= halves_chi2;
       report.doubts.push_back(Format(
           "the two halves of the recording disagree beyond their noise (chi2 per parameter %.0f "
           "instead of 1): something moves that the model holds constant, or the scene is "

@@ -22,7 +22,8 @@ using Progress = std::function<void(const std::string& stage, double done)>;
 
 struct CalibrateOptions {
   ResidualKind residual = ResidualKind::kPlane;
-  bool refine = true;  // false: the online estimate is the result
+  bool refine = true;   // false: the online estimate is the result
+  std::string effects;  // of the catalogue, to fit as well; see MakeEffects
   StartOptions start;
   FocalScanOptions focal_scan;
   SlidingWindowOptions window;

@@ -15,7 +15,9 @@ namespace camgyro {
 struct MatchResidual {
   int frame_a = 0, frame_b = 0;  // indices into Recording::frames
   Match match;
-  double time_s = 0.0;      // at which px_b was exposed, gyro clock from EstimationInput::origin_ns
+  // At which px_b was exposed, gyro clock from EstimationInput::origin_ns; effects of the clock are
+  // left out.
+  double time_s = 0.0;
   double rate_rad_s = 0.0;  // of the camera at that time, bias removed
   // Signed distance from the plane of the pair (Sampson), of one noisy coordinate [px]. The sign
   // follows the sign of the pair's direction and has no meaning across pairs.
@@ -27,8 +29,9 @@ struct MatchResidual {
 };
 
 // Residuals of all matches of the pairs that the gyro covers. Rates are the gyro's own, less the
-// calibration's bias; the translation direction of each pair is the best for this calibration.
-// noise_px: of one coordinate, for the robust loss. Cost: one direction search for each pair.
+// calibration's bias and effects; the translation direction of each pair is the best for this
+// calibration. noise_px: of one coordinate, for the robust loss. Cost: one direction search for
+// each pair.
 std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
                                             const std::vector<TimedPair>& pairs,
                                             const Calibration& calibration, double noise_px,

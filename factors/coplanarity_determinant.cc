@@ -16,6 +16,7 @@ CoplanarityDeterminant::CoplanarityDeterminant(std::shared_ptr<const PairMeasure
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   set_num_residuals(static_cast<int>(triplets_.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4};
+  if (pair_->effects) mutable_parameter_block_sizes()->push_back(pair_->effects->size());
   for (const int size : pair_->rate_group_sizes) {
     mutable_parameter_block_sizes()->push_back(3 * size);
   }
@@ -26,10 +27,12 @@ bool CoplanarityDeterminant::Evaluate(double const* const* parameters, double* r
   using Eigen::Vector2d;
   using Eigen::Vector3d;
   const PairMeasurement& pair = *pair_;
-  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + kFirstRateGroup);
+  const int first_rate_group = kEffectsBlock + NumEffectBlocks(pair);
+  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + first_rate_group);
   const RotationChain chain(pair.rate_times_s, rates);
   PairBearings bearings;
   if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],
+                            pair.effects ? parameters[kEffectsBlock] : nullptr,
                             jacobians != nullptr, &bearings)) {
     return false;
   }
@@ -81,13 +84,13 @@ bool CoplanarityDeterminant::Evaluate(double const* const* parameters, double* r
       const Vector3d& ray_b = b[i]->ray_ref;
       const Vector3d half_var_by_a = q_b[i].cross(c[i]) + ray_b.cross(half_var_by_n[i]);
       const Vector3d half_var_by_b = c[i].cross(q_a[i]) + half_var_by_n[i].cross(ray_a);
-      row.Add(*a[i], chain, pair.height_px, inv_sigma * m_a[i] - k * half_var_by_a,
+      row.Add(*a[i], chain, pair.size_px.y(), inv_sigma * m_a[i] - k * half_var_by_a,
               (-k * var_a) * m_a[i] * p_a[i].transpose());
-      row.Add(*b[i], chain, pair.height_px, inv_sigma * m_b[i] - k * half_var_by_b,
+      row.Add(*b[i], chain, pair.size_px.y(), inv_sigma * m_b[i] - k * half_var_by_b,
               (-k * var_b) * m_b[i] * p_b[i].transpose());
     }
-    row.Write(static_cast<int>(t), robust.derivative, parameters[2], pair.rate_group_sizes,
-              kFirstRateGroup, jacobians);
+    row.Write(static_cast<int>(t), robust.derivative, parameters[2], pair, first_rate_group,
+              jacobians);
   }
   return true;
 }

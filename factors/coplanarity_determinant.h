@@ -19,6 +19,7 @@ namespace camgyro {
 // Parameters  lens         8   LensParameters
 //             shutter      2   t_d [s], t_r [s]
 //             q_gyro_cam   4   RotationManifold
+//             effects      of PairMeasurement::effects, if there are any
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    one per triplet, in sigmas: first-order propagation of the noise of all six rays,
 //             differentiated with the parameters
@@ -35,7 +36,7 @@ class CoplanarityDeterminant final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
-  static constexpr int kFirstRateGroup = 3;
+  static constexpr int kEffectsBlock = 3;  // the first rate group without effects
 
  private:
   const std::shared_ptr<const PairMeasurement> pair_;

@@ -40,6 +40,7 @@ CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   set_num_residuals(static_cast<int>(pair_->matches.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3, 3};
+  if (pair_->effects) mutable_parameter_block_sizes()->push_back(pair_->effects->size());
   for (const int size : pair_->rate_group_sizes) {
     mutable_parameter_block_sizes()->push_back(3 * size);
   }
@@ -48,10 +49,12 @@ CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
 bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residuals,
                                 double** jacobians) const {
   const PairMeasurement& pair = *pair_;
-  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + kFirstRateGroup);
+  const int first_rate_group = kEffectsBlock + NumEffectBlocks(pair);
+  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + first_rate_group);
   const RotationChain chain(pair.rate_times_s, rates);
   PairBearings bearings;
   if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],
+                            pair.effects ? parameters[kEffectsBlock] : nullptr,
                             jacobians != nullptr, &bearings)) {
     return false;
   }
@@ -70,11 +73,11 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
     residuals[i] = robust.value;
     if (jacobians == nullptr) continue;
     row.Clear();
-    row.Add(a, chain, pair.height_px, r.by_a, r.by_J_a);
-    row.Add(b, chain, pair.height_px, r.by_b, r.by_J_b);
+    row.Add(a, chain, pair.size_px.y(), r.by_a, r.by_J_a);
+    row.Add(b, chain, pair.size_px.y(), r.by_b, r.by_J_b);
     row.AddReadout(share * r.by_tau.dot(turn));
-    row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair.rate_group_sizes,
-              kFirstRateGroup, jacobians);
+    row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair, first_rate_group,
+              jacobians);
     if (jacobians[kTauBlock] != nullptr) {
       Eigen::Map<Eigen::Vector3d>(jacobians[kTauBlock] + 3 * i) = robust.derivative * r.by_tau;
     }

@@ -41,6 +41,7 @@ PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matri
 //             tau          3   SphereManifold<3>: translation direction in the pair's reference,
 //                              the gyro frame at the first rate (sign without meaning)
 //             turn         3   change of tau over the interval of the pair [rad]; give it a prior
+//             effects      of PairMeasurement::effects, if there are any
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    one per match, in sigmas. sigma_i is propagated through lens, readout and rotation,
 //             and differentiated with them.
@@ -56,12 +57,12 @@ class CoplanarityPlane final : public ceres::CostFunction {
 
   static constexpr int kTauBlock = 3;
   static constexpr int kTurnBlock = 4;
-  static constexpr int kFirstRateGroup = 5;
+  static constexpr int kEffectsBlock = 5;  // the first rate group without effects
 
   // s_i of a match, per second of readout.
   static double RowShare(const PairMeasurement& pair, const Match& match) {
-    return (0.5 * (match.px_a.y() + match.px_b.y()) / pair.height_px - 0.5) /
-           (pair.time_b_s - pair.time_a_s);
+    return (0.5 * (match.px_a.y() + match.px_b.y()) / pair.size_px.y() - 0.5) /
+           (pair.frame_b.stamp_s - pair.frame_a.stamp_s);
   }
 
  private:

@@ -2,15 +2,25 @@
 
 #include <glog/logging.h>
 
+#include <utility>
+
 namespace camgyro {
 
-GyroRate::GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d& sigma_rad_s)
-    : measured_(measured_rad_s), inv_sigma_(sigma_rad_s.cwiseInverse()) {
+GyroRate::GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d& sigma_rad_s,
+                   std::shared_ptr<const EffectSet> effects, std::vector<double> times_s)
+    : measured_(measured_rad_s),
+      inv_sigma_(sigma_rad_s.cwiseInverse()),
+      effects_(std::move(effects)),
+      times_s_(std::move(times_s)) {
   CHECK_GT(sigma_rad_s.minCoeff(), 0.0);
   CHECK_GT(measured_.cols(), 0);
   const int size = static_cast<int>(measured_.size());
   set_num_residuals(size);
   *mutable_parameter_block_sizes() = {size, 3};
+  if (effects_) {
+    CHECK_EQ(static_cast<Eigen::Index>(times_s_.size()), measured_.cols());
+    mutable_parameter_block_sizes()->push_back(effects_->size());
+  }
 }
 
 bool GyroRate::Evaluate(double const* const* parameters, double* residuals,
@@ -18,18 +28,37 @@ bool GyroRate::Evaluate(double const* const* parameters, double* residuals,
   const Eigen::Index n = measured_.cols();
   const Eigen::Map<const Eigen::Matrix3Xd> rates(parameters[0], 3, n);
   const Eigen::Map<const Eigen::Vector3d> bias(parameters[1]);
-  Eigen::Map<Eigen::Matrix3Xd>(residuals, 3, n) =
-      inv_sigma_.asDiagonal() * ((rates - measured_).colwise() + Eigen::Vector3d(bias));
+  Eigen::Map<Eigen::Matrix3Xd> r(residuals, 3, n);
+  r = (rates - measured_).colwise() + Eigen::Vector3d(bias);
+  Eigen::MatrixXd E;
+  if (effects_) {
+    E.resize(3 * n, effects_->size());
+    for (Eigen::Index i = 0; i < n; ++i) {
+      effects_->ChangeRate(times_s_[static_cast<size_t>(i)], rates.col(i), E.middleRows<3>(3 * i));
+    }
+    Eigen::Map<Eigen::VectorXd>(residuals, 3 * n) +=
+        E * Eigen::Map<const Eigen::VectorXd>(parameters[2], E.cols());
+  }
+  r = inv_sigma_.asDiagonal() * r;
   if (jacobians == nullptr) return true;
   if (jacobians[0] != nullptr) {
-    Eigen::Map<Eigen::MatrixXd>(jacobians[0], 3 * n, 3 * n) =
-        inv_sigma_.replicate(n, 1).asDiagonal();
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J(
+        jacobians[0], 3 * n, 3 * n);
+    J = inv_sigma_.replicate(n, 1).asDiagonal();
+    if (effects_) {
+      const Eigen::Matrix3d by_rate = inv_sigma_.asDiagonal() * effects_->RateByRate(parameters[2]);
+      for (Eigen::Index i = 0; i < n; ++i) J.block<3, 3>(3 * i, 3 * i) += by_rate;
+    }
   }
   if (jacobians[1] != nullptr) {
     Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>> J(jacobians[1], 3 * n, 3);
     for (Eigen::Index i = 0; i < n; ++i) {
       J.middleRows<3>(3 * i) = inv_sigma_.asDiagonal();
     }
+  }
+  if (effects_ && jacobians[2] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+        jacobians[2], 3 * n, E.cols()) = inv_sigma_.replicate(n, 1).asDiagonal() * E;
   }
   return true;
 }

@@ -5,13 +5,18 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "core/effects/catalogue.h"
 
 namespace camgyro {
 
-//   r_n = (w_n + b_g - w_n_measured) / sigma
+//   r_n = (w_n + b_g + E_n(w_n) e - w_n_measured) / sigma,  E: EffectSet::ChangeRate
 //
 // Parameters  rates              3 n   one rate group, gyro frame [rad/s]
 //             bias_gyro_rad_s    3     gyro frame
+//             effects            e, if there are any (core/effects)
 // Residual    3 n, in sigmas
 // Source      design.md section 1 and 3: w_measured = w_true + b_g + noise. (Eq. (8) of Jia &
 //             Evans writes the bias with the opposite sign.)
@@ -19,7 +24,9 @@ class GyroRate final : public ceres::CostFunction {
  public:
   // measured: one reading per column [rad/s]; sigma_rad_s > 0: white noise of one
   // reading, per axis.
-  GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d& sigma_rad_s);
+  // effects: null, or with parameters; then times_s are those of the readings.
+  GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d& sigma_rad_s,
+           std::shared_ptr<const EffectSet> effects = nullptr, std::vector<double> times_s = {});
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
@@ -27,6 +34,8 @@ class GyroRate final : public ceres::CostFunction {
  private:
   const Eigen::Matrix3Xd measured_;
   const Eigen::Vector3d inv_sigma_;
+  const std::shared_ptr<const EffectSet> effects_;
+  const std::vector<double> times_s_;
 };
 
 }  // namespace camgyro

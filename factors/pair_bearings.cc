@@ -6,21 +6,22 @@ namespace camgyro {
 
 bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
                           const double* lens, const double* shutter, const double* q_gyro_cam,
-                          bool derivatives, PairBearings* bearings) {
+                          const double* effects, bool derivatives, PairBearings* bearings) {
   const LensParameters lens_parameters = Eigen::Map<const LensParameters>(lens);
   const ShutterParameters shutter_parameters = Eigen::Map<const ShutterParameters>(shutter);
   const Eigen::Matrix3d R_gyro_cam =
       Eigen::Map<const Eigen::Quaterniond>(q_gyro_cam).normalized().toRotationMatrix();
+  const PairEffects pair_effects{pair.effects.get(), effects};
   const size_t n = pair.matches.size();
   bearings->a.resize(n);
   bearings->b.resize(n);
   for (size_t i = 0; i < n; ++i) {
     if (!EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
-                         pair.time_a_s, pair.height_px, pair.matches[i].px_a, &bearings->a[i],
-                         derivatives) ||
+                         pair.frame_a, pair.size_px, pair.matches[i].px_a, pair_effects,
+                         &bearings->a[i], derivatives) ||
         !EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
-                         pair.time_b_s, pair.height_px, pair.matches[i].px_b, &bearings->b[i],
-                         derivatives)) {
+                         pair.frame_b, pair.size_px, pair.matches[i].px_b, pair_effects,
+                         &bearings->b[i], derivatives)) {
       return false;
     }
   }
@@ -40,9 +41,8 @@ Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* 
   return rates;
 }
 
-void PairRow::Write(int row, double scale, const double* q_gyro_cam,
-                    const std::vector<int>& group_sizes, int first_rate_group,
-                    double** jacobians) const {
+void PairRow::Write(int row, double scale, const double* q_gyro_cam, const PairMeasurement& pair,
+                    int first_rate_group, double** jacobians) const {
   if (jacobians[0] != nullptr) {
     Eigen::Map<Eigen::Matrix<double, 1, kLensSize>>(jacobians[0] + row * kLensSize) =
         scale * gradient_.by_lens;
@@ -55,7 +55,13 @@ void PairRow::Write(int row, double scale, const double* q_gyro_cam,
     Eigen::Map<Eigen::RowVector4d>(jacobians[2] + row * 4) =
         scale * RotationManifold::Lift(gradient_.by_rotation, q_gyro_cam);
   }
+  if (pair.effects && jacobians[first_rate_group - 1] != nullptr) {
+    const int size = pair.effects->size();
+    Eigen::Map<Eigen::RowVectorXd>(jacobians[first_rate_group - 1] + row * size, size) =
+        scale * gradient_.by_effects;
+  }
   int column = 0;
+  const std::vector<int>& group_sizes = pair.rate_group_sizes;
   for (size_t g = 0; g < group_sizes.size(); ++g) {
     double* jacobian = jacobians[static_cast<size_t>(first_rate_group) + g];
     if (jacobian != nullptr) {

@@ -4,6 +4,7 @@
 #define CAMGYRO_FACTORS_PAIR_BEARINGS_H_
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "core/pair_model.h"
@@ -14,12 +15,13 @@ namespace camgyro {
 // One pair of frames as the coplanarity factors see it. Times in seconds from the window's origin.
 struct PairMeasurement {
   std::vector<Match> matches;
-  double time_a_s = 0.0, time_b_s = 0.0;  // recorded stamps of the two frames
-  double height_px = 0.0;
+  FrameTime frame_a, frame_b;
+  Eigen::Vector2d size_px = Eigen::Vector2d::Zero();
   double sigma_px = 1.0;  // > 0, per axis of a noisy observation
   MatchNoise noise = MatchNoise::kBothImages;
   double robust_threshold = 0.0;  // in sigmas; 0: no loss
   const Lens* lens = nullptr;
+  std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
 
   // Rates that the pair needs: their times, strictly increasing, split into consecutive parameter
   // blocks of these sizes (in samples).
@@ -31,9 +33,10 @@ struct PairMeasurement {
 };
 
 // Order of the parameter blocks of the coplanarity factors:
-//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>), turn 3,] rate
-//   groups
+//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>), turn 3,]
+//   [effects, if the pair has any,] rate groups
 // q_gyro_cam is stored [x y z w].
+inline int NumEffectBlocks(const PairMeasurement& pair) { return pair.effects ? 1 : 0; }
 
 struct PairBearings {
   std::vector<Bearing> a, b;
@@ -43,8 +46,8 @@ struct PairBearings {
 // `derivatives`.
 [[nodiscard]] bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
                                         const double* lens, const double* shutter,
-                                        const double* q_gyro_cam, bool derivatives,
-                                        PairBearings* bearings);
+                                        const double* q_gyro_cam, const double* effects,
+                                        bool derivatives, PairBearings* bearings);
 
 // The rates of all groups as columns.
 Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* const* groups);
@@ -63,11 +66,14 @@ class PairRow {
            const Eigen::Vector3d& by_ray, const Eigen::Matrix<double, 3, 2>& by_J_ray_px) {
     Backpropagate(bearing, chain, height_px, by_ray, by_J_ray_px, &gradient_, by_rates_);
   }
+  const PairGradient& gradient() const { return gradient_; }
+  const Eigen::Matrix3Xd& by_rates() const { return by_rates_; }
   // Adds a derivative by the readout time that does not come through a bearing.
   void AddReadout(double by_readout) { gradient_.by_shutter[kReadout] += by_readout; }
-  // Writes the row, times `scale`, to the Jacobians of lens, shutter, rotation and rate groups.
-  // Entries of `jacobians` may be null (constant blocks). first_rate_group: index of that block.
-  void Write(int row, double scale, const double* q_gyro_cam, const std::vector<int>& group_sizes,
+  // Writes the row, times `scale`, to the Jacobians of lens, shutter, rotation, effects and rate
+  // groups. Entries of `jacobians` may be null (constant blocks). first_rate_group: index of that
+  // block; the effects, if the pair has any, come before it.
+  void Write(int row, double scale, const double* q_gyro_cam, const PairMeasurement& pair,
              int first_rate_group, double** jacobians) const;
 
  private:

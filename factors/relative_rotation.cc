@@ -19,17 +19,32 @@ RelativeRotation::RelativeRotation(std::shared_ptr<const Measurement> measuremen
   CHECK_GE(m.rate_times_s.size(), 2u);
   set_num_residuals(3);
   *mutable_parameter_block_sizes() = {kShutterSize, 4};
+  if (m.effects) mutable_parameter_block_sizes()->push_back(m.effects->size());
   for (const int size : m.rate_group_sizes) mutable_parameter_block_sizes()->push_back(3 * size);
 }
 
 bool RelativeRotation::Evaluate(double const* const* parameters, double* residuals,
                                 double** jacobians) const {
   const Measurement& m = *measurement_;
+  const int first_rate_group = kEffectsBlock + (m.effects ? 1 : 0);
   const RotationChain chain(m.rate_times_s,
-                            GatherRates(m.rate_group_sizes, parameters + kFirstRateGroup));
-  const double shift = parameters[0][kDelay] + m.row_fraction * parameters[0][kReadout];
-  const RotationChain::State a = chain.At(m.time_a_s + shift);
-  const RotationChain::State b = chain.At(m.time_b_s + shift);
+                            GatherRates(m.rate_group_sizes, parameters + first_rate_group));
+  double time_a_s = m.frame_a.stamp_s, time_b_s = m.frame_b.stamp_s;
+  for (double* time : {&time_a_s, &time_b_s}) {
+    *time += parameters[0][kDelay] + m.row_fraction * parameters[0][kReadout];
+  }
+  EffectSet::Change change_a, change_b;
+  if (m.effects) {
+    // An attitude has no pixel: it is that of the row, in a picture of unit size.
+    const Eigen::Vector2d px(0.5, m.row_fraction), size(1.0, 1.0);
+    m.effects->ChangeObservation({px, size, m.frame_a}, &change_a);
+    m.effects->ChangeObservation({px, size, m.frame_b}, &change_b);
+    const Eigen::Map<const Eigen::VectorXd> values(parameters[kEffectsBlock], m.effects->size());
+    time_a_s += change_a.time.row(0) * values;
+    time_b_s += change_b.time.row(0) * values;
+  }
+  const RotationChain::State a = chain.At(time_a_s);
+  const RotationChain::State b = chain.At(time_b_s);
   const Eigen::Matrix3d R_gyro_cam =
       Eigen::Map<const Eigen::Quaterniond>(parameters[1]).normalized().toRotationMatrix();
   const Eigen::Matrix3d R_a_b = m.q_a_b.toRotationMatrix();
@@ -54,6 +69,12 @@ bool RelativeRotation::Evaluate(double const* const* parameters, double* residua
     J.col(kDelay) = by_shift;
     J.col(kReadout) = m.row_fraction * by_shift;
   }
+  if (m.effects && jacobians[kEffectsBlock] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>>(jacobians[kEffectsBlock],
+                                                                          3, m.effects->size()) =
+        J_phi_a *
+        (a.PhiPerSecond() * change_a.time.row(0) - b.PhiPerSecond() * change_b.time.row(0));
+  }
   if (jacobians[1] != nullptr) {
     const Eigen::Matrix3d J_rotation = robust * RightJacobianInverse(log_error) * R_gyro_cam *
                                        (R_a_b.transpose() - Eigen::Matrix3d::Identity());
@@ -69,7 +90,7 @@ bool RelativeRotation::Evaluate(double const* const* parameters, double* residua
     int column = 0;
     for (size_t g = 0; g < m.rate_group_sizes.size(); ++g) {
       const int size = m.rate_group_sizes[g];
-      if (double* J = jacobians[kFirstRateGroup + g]) {
+      if (double* J = jacobians[static_cast<size_t>(first_rate_group) + g]) {
         Eigen::Map<Eigen::Matrix3Xd>(J + 3 * size * i, 3, size) = by_rates.middleCols(column, size);
       }
       column += size;

@@ -8,6 +8,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/effects/catalogue.h"
+
 namespace camgyro {
 
 //   r = Robustify_norm( Log( R_gyro_b^T R_gyro_a * R_gyro_cam R_cama_camb R_gyro_cam^T ) / sigma )
@@ -15,6 +17,7 @@ namespace camgyro {
 //
 // Parameters  shutter      2   t_d [s], t_r [s]
 //             q_gyro_cam   4   RotationManifold
+//             effects      of Measurement::effects, if there are any
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    3, in sigmas, in the gyro frame of the second exposure
 // Valid       while the argument of Log turns by less than pi - 0.1 rad; the caller gates
@@ -23,11 +26,12 @@ namespace camgyro {
 class RelativeRotation final : public ceres::CostFunction {
  public:
   struct Measurement {
-    Eigen::Quaterniond q_a_b;               // vectors of camera b into camera a
-    double time_a_s = 0.0, time_b_s = 0.0;  // stamps, seconds from the window's origin
-    double row_fraction = 0.0;              // row that the rotation refers to, of the height
-    double sigma_rad = 0.0;                 // > 0, per axis
-    double robust_threshold = 0.0;          // in sigmas of each axis; 0: no loss
+    Eigen::Quaterniond q_a_b;  // vectors of camera b into camera a
+    FrameTime frame_a, frame_b;
+    double row_fraction = 0.0;                 // row that the rotation refers to, of the height
+    double sigma_rad = 0.0;                    // > 0, per axis
+    double robust_threshold = 0.0;             // in sigmas of each axis; 0: no loss
+    std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
     std::vector<double> rate_times_s;
     std::vector<int> rate_group_sizes;
   };
@@ -37,7 +41,7 @@ class RelativeRotation final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
-  static constexpr int kFirstRateGroup = 2;
+  static constexpr int kEffectsBlock = 2;  // the first rate group without effects
 
  private:
   const std::shared_ptr<const Measurement> measurement_;

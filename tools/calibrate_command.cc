@@ -18,6 +18,9 @@ DEFINE_string(estimator, "window", "online estimator: window");
 DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");
 DEFINE_bool(refine, true,
             "skip the last step, all frames in one problem: the online estimate is the result");
+DEFINE_string(effects, "",
+              "effects to fit as well, separated by commas, each with a shape after a colon if it "
+              "has several: radial_distortion,focal_drift:linear (names: docs/effects.md)");
 DEFINE_double(search_s, 2.0, "half range of the delay search");
 DECLARE_bool(quiet);
 
@@ -37,6 +40,7 @@ Result<CalibrateOptions> OptionsFromFlags() {
   if (!(FLAGS_search_s > 0.0)) return BadUsage("--search_s: expected a positive number");
   options.start.search_s = FLAGS_search_s;
   options.refine = FLAGS_refine;
+  options.effects = FLAGS_effects;
   return options;
 }
 
@@ -104,7 +108,7 @@ Command CalibrateCommand() {
   command.summary =
       "focal length, readout time, delay, mounting and gyro bias: with their uncertainty, into "
       "calibration.yaml (trace.csv: the online estimate over time; delay.csv: the delay search)";
-  command.flags = {"out", "residual", "estimator", "refine"};
+  command.flags = {"out", "effects", "residual", "estimator", "refine"};
   for (const std::string& name : GuessFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"search_s", "quiet"});
   command.run = RunCalibrate;

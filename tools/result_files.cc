@@ -3,6 +3,7 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -34,6 +35,15 @@ void EmitVector(YAML::Emitter& out, const char* key, const Values& value, const 
       << YAML::Value << value << YAML::Key << sigma_key << YAML::Value << sigma << YAML::EndMap;
 }
 
+// Standard deviations of the coordinates of the lens block that effects have changed; else zero.
+LensParameters FittedLensSigma(const Calibration& c) {
+  LensParameters sigma = LensParameters::Zero();
+  if (c.pair_effects().set == nullptr) return sigma;
+  const Eigen::VectorXd all = c.effect_covariance.diagonal().cwiseSqrt();
+  // One effect has one coordinate of the lens: the change by one sigma is the sigma.
+  return (c.effects->ConstantLens(sigma, all)).cwiseAbs();
+}
+
 void BeginSection(YAML::Emitter& out, const char* key) {
   out << YAML::Key << key << YAML::Value << YAML::BeginMap;
 }
@@ -45,15 +55,41 @@ void EmitCamera(YAML::Emitter& out, const Calibration& c) {
       << std::vector<int>{c.width_px, c.height_px};
   EmitScalar(out, "focal_px", c.lens[kFocal], sigma[kStateFocal]);
   EmitVector(out, "principal_px", {c.lens[kCx], c.lens[kCy]}, "sigma", Segment(sigma, kStateCx, 2));
-  EmitScalar(out, "aspect_ratio", c.lens[kAspect], 0.0);
-  Values coefficients;
-  if (c.distortion_model != DistortionModel::kNone) {
-    coefficients.assign(c.lens.data() + kK1, c.lens.data() + kLensSize);
+  // Distortion and aspect ratio with what effects have added to them.
+  const LensParameters lens = c.FullLens(), lens_sigma = FittedLensSigma(c);
+  EmitScalar(out, "aspect_ratio", lens[kAspect], lens_sigma[kAspect]);
+  Values coefficients, coefficients_sigma;
+  const bool distorted = !lens.segment<4>(kK1).isZero(0.0);
+  if (c.distortion_model != DistortionModel::kNone || distorted) {
+    coefficients.assign(lens.data() + kK1, lens.data() + kLensSize);
+    coefficients_sigma.assign(lens_sigma.data() + kK1, lens_sigma.data() + kLensSize);
   }
+  const DistortionModel model = distorted ? DistortionModel::kRadTan : c.distortion_model;
   out << YAML::Key << "distortion" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
-      << "model" << YAML::Value << DistortionModelName(c.distortion_model) << YAML::Key << "value"
-      << YAML::Value << coefficients << YAML::Key << "sigma" << YAML::Value
-      << Values(coefficients.size(), 0.0) << YAML::EndMap << YAML::EndMap;
+      << "model" << YAML::Value << DistortionModelName(model) << YAML::Key << "value" << YAML::Value
+      << coefficients << YAML::Key << "sigma" << YAML::Value << coefficients_sigma << YAML::EndMap
+      << YAML::EndMap;
+}
+
+void EmitEffects(YAML::Emitter& out, const Calibration& c) {
+  out << YAML::Key << "effects" << YAML::Value << YAML::BeginSeq;
+  const size_t count = c.effects ? c.effects->items().size() : 0;
+  for (size_t i = 0; i < count; ++i) {
+    const EffectSet::Item& item = c.effects->items()[i];
+    out << YAML::BeginMap << YAML::Key << "name" << YAML::Value << item.entry->name << YAML::Key
+        << "shape" << YAML::Value << item.shape << YAML::Key << "parameters" << YAML::Value
+        << YAML::BeginSeq;
+    for (int k = 0; k < item.effect->size(); ++k) {
+      const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+      const int column = item.first + k;
+      out << YAML::Flow << YAML::BeginMap << YAML::Key << "name" << YAML::Value << p.name
+          << YAML::Key << "unit" << YAML::Value << p.unit << YAML::Key << "value" << YAML::Value
+          << c.effect_values[column] << YAML::Key << "sigma" << YAML::Value
+          << std::sqrt(c.effect_covariance(column, column)) << YAML::EndMap;
+    }
+    out << YAML::EndSeq << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
 }
 
 void EmitCovariance(YAML::Emitter& out, const Calibration& c) {
@@ -173,7 +209,7 @@ std::string CalibrationYaml(const CalibrationReport& report, bool attitudes) {
              {c.q_gyro_cam.w(), c.q_gyro_cam.x(), c.q_gyro_cam.y(), c.q_gyro_cam.z()}, "sigma_rad",
              Segment(sigma, kStateRotation, 3));
   out << YAML::EndMap;
-  out << YAML::Key << "effects" << YAML::Value << YAML::Flow << YAML::BeginSeq << YAML::EndSeq;
+  EmitEffects(out, c);
   EmitCovariance(out, c);
   EmitQuality(out, report, attitudes);
   out << YAML::EndMap;

@@ -33,13 +33,38 @@ std::string TableRow(const ParameterRow& row) {
          "\n";
 }
 
+// Each effect with its parameters, at most four of a kind; seconds as ms.
+std::string EffectRows(const Calibration& c) {
+  std::string rows;
+  if (!c.effects) return rows;
+  for (const EffectSet::Item& item : c.effects->items()) {
+    rows += "  " + item.entry->name + (item.effect->size() == 0 ? " (no number of its own)" : "") +
+            "\n";
+    for (int k = 0; k < item.effect->size(); ++k) {
+      if (k == 4 && item.effect->size() > 5) {
+        rows += Format("    and %d more, in calibration.yaml\n", item.effect->size() - 4);
+        break;
+      }
+      const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+      const bool seconds = p.unit == "s";
+      const int column = item.first + k;
+      const double scale = seconds ? 1e3 : 1.0;
+      const double sigma = scale * std::sqrt(c.effect_covariance(column, column));
+      rows += Format("    %-20s %12.*f ± %-9.*f %s\n", p.name.c_str(), DecimalsFor(sigma),
+                     scale * c.effect_values[column], DecimalsFor(sigma), sigma,
+                     seconds ? "ms" : p.unit.c_str());
+    }
+  }
+  return rows;
+}
+
 }  // namespace
 
 std::string ParameterTable(const Calibration& c, bool attitudes) {
   const Eigen::Matrix3d permutation = MountingPermutation(c);
   std::string table;
   for (const ParameterRow& row : ParameterRows(c, permutation, attitudes)) table += TableRow(row);
-  return table +
+  return table + EffectRows(c) +
          "  (t_gyro = t_camera + delay; the mounting is what is left, about the camera's\n"
          "  axes, after " +
          DescribePermutation(permutation) + ")\n";

@@ -25,6 +25,8 @@ EstimationInput MakeEstimationInput(const Recording& recording) {
         SecondsSince(input.origin_ns, recording.frames[static_cast<size_t>(a)].stamp_ns);
     pair.time_b_s =
         SecondsSince(input.origin_ns, recording.frames[static_cast<size_t>(b)].stamp_ns);
+    pair.exposure_a_s = recording.frames[static_cast<size_t>(a)].exposure_s;
+    pair.exposure_b_s = recording.frames[static_cast<size_t>(b)].exposure_s;
     input.pairs.push_back(std::move(pair));
     return input.pairs.back();
   };
@@ -43,6 +45,26 @@ EstimationInput MakeEstimationInput(const Recording& recording) {
     }
   }
   return input;
+}
+
+EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration) {
+  EffectSetup setup;
+  setup.size_px << recording.camera.width_px, recording.camera.height_px;
+  setup.delay_s = calibration.delay_s;
+  setup.readout_s = calibration.readout_s;
+  setup.R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
+  setup.has_pixels = !recording.matches.empty() || !recording.tracks.empty();
+  const int64_t origin_ns = recording.gyro.front().stamp_ns;
+  for (const Frame& frame : recording.frames) {
+    setup.frames.push_back({SecondsSince(origin_ns, frame.stamp_ns), frame.exposure_s});
+  }
+  setup.gyro_rad_s.resize(3, static_cast<Eigen::Index>(recording.gyro.size()));
+  for (const GyroSample& sample : recording.gyro) {
+    setup.gyro_rad_s.col(static_cast<Eigen::Index>(setup.gyro_times_s.size())) =
+        sample.omega_gyro_rad_s;
+    setup.gyro_times_s.push_back(SecondsSince(origin_ns, sample.stamp_ns));
+  }
+  return setup;
 }
 
 Eigen::Vector3d GyroSigma(const Recording& recording, double delay_s) {

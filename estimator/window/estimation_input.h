@@ -3,6 +3,7 @@
 #define CAMGYRO_ESTIMATOR_WINDOW_ESTIMATION_INPUT_H_
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/recording.h"
@@ -15,8 +16,13 @@ struct TimedPair {
   int64_t id = 0;  // ascending with time_a_s
   int frame_a = 0, frame_b = 0;
   double time_a_s = 0.0, time_b_s = 0.0;
+  double exposure_a_s = std::numeric_limits<double>::quiet_NaN();  // NaN: not recorded
+  double exposure_b_s = std::numeric_limits<double>::quiet_NaN();
   std::vector<Match> matches;  // empty for rotations
   CameraRotation rotation;     // of recordings with attitudes
+
+  FrameTime first() const { return {time_a_s, exposure_a_s}; }
+  FrameTime second() const { return {time_b_s, exposure_b_s}; }
 };
 
 struct EstimationInput {
@@ -28,6 +34,9 @@ struct EstimationInput {
 // Pairs of neighbouring frames from matches, tracks or attitudes. (Attitudes further apart move the
 // delay: tablet-attitude D03 by 1 ms for each frame.) What is absent gives no pairs.
 EstimationInput MakeEstimationInput(const Recording& recording);
+
+// What effects may know of a recording, with what a calibration says of it so far.
+EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration);
 
 // White noise of one gyro sample per axis [rad/s]: as declared, else what the samples show while
 // the camera ran (third differences, robust), within [5e-4, 2e-2]. What vibration and sampling add

@@ -15,7 +15,7 @@
 namespace camgyro {
 
 // What a block is. Order of the enumeration and of the index is the order of solving.
-enum class BlockKind { kLens, kShutter, kRotation, kBias, kRates, kDirection, kTurn };
+enum class BlockKind { kLens, kShutter, kRotation, kEffects, kBias, kRates, kDirection, kTurn };
 
 struct BlockId {
   BlockKind kind = BlockKind::kLens;

@@ -22,6 +22,7 @@ namespace {
 const BlockId kLensBlock{BlockKind::kLens, 0};
 const BlockId kShutterBlock{BlockKind::kShutter, 0};
 const BlockId kRotationBlock{BlockKind::kRotation, 0};
+const BlockId kEffectsBlock{BlockKind::kEffects, 0};
 BlockId BiasBlock(int64_t index) { return {BlockKind::kBias, index}; }
 BlockId RatesBlock(int64_t index) { return {BlockKind::kRates, index}; }
 BlockId DirectionBlock(int64_t index) { return {BlockKind::kDirection, index}; }
@@ -69,10 +70,37 @@ PairGraph::PairGraph(const Calibration& start, const Calibration& prior_mean,
                        inv_sigma.asDiagonal(), Eigen::VectorXd::Zero(size)),
                    {kLensBlock, kShutterBlock, kRotationBlock});
   prior_mean_.prior_sigma = sigma;
+  prior_mean_.effects = start.effects;
   start_bias_ = start.bias_gyro_rad_s;
+  double turn_sigma = options_.turn_sigma_rad;
+  if (start.effects) turn_sigma = std::max(turn_sigma, start.effects->turn_sigma_rad());
   turn_prior_ = std::make_shared<MarginalPrior>(
       std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(3), false}},
-      Eigen::MatrixXd::Identity(3, 3) / options_.turn_sigma_rad, Eigen::VectorXd::Zero(3));
+      Eigen::MatrixXd::Identity(3, 3) / turn_sigma, Eigen::VectorXd::Zero(3));
+  if (const auto effects = Effects()) {
+    num_effects_ = effects->size();
+    CHECK_EQ(start.effect_values.size(), num_effects_);
+    graph_.AddBlock(kEffectsBlock, {Geometry::kEuclidean, start.effect_values, {}});
+    Eigen::VectorXd inv_spread(num_effects_);
+    for (int i = 0; i < num_effects_; ++i) inv_spread[i] = 1.0 / effects->parameter(i).spread;
+    graph_.AddFactor(
+        std::make_shared<MarginalPrior>(
+            std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(num_effects_), false}},
+            inv_spread.asDiagonal(), Eigen::VectorXd::Zero(num_effects_)),
+        {kEffectsBlock});
+  }
+}
+
+PairEffects PairGraph::EffectsNow() const {
+  if (num_effects_ == 0) return {};
+  return {prior_mean_.effects.get(), graph_.value(kEffectsBlock).data()};
+}
+
+std::pair<double, double> PairGraph::Exposures(const FrameTime& frame_a,
+                                               const FrameTime& frame_b) const {
+  return ExposureSpan(graph_.value(kShutterBlock),
+                      Eigen::Vector2d(prior_mean_.width_px, prior_mean_.height_px), EffectsNow(),
+                      frame_a, frame_b);
 }
 
 void PairGraph::AddRate(const TimedRate& rate) {
@@ -152,13 +180,23 @@ AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, std::vector<
       measured.col(i) = sample(covered_until + i).omega_gyro_rad_s;
     }
     const Eigen::Vector3d bias = graph_.value(BiasBlock(group.bias_index));
-    const Eigen::Matrix3Xd rates = measured.colwise() - bias;
+    Eigen::Matrix3Xd rates = measured.colwise() - bias;
+    std::vector<double> group_times;
+    std::vector<BlockId> rate_blocks = {RatesBlock(next_group_), BiasBlock(group.bias_index)};
+    if (num_effects_ > 0) {
+      rate_blocks.push_back(kEffectsBlock);
+      for (int i = 0; i < group.count; ++i) {
+        group_times.push_back(sample(covered_until + i).time_s);
+        rates.col(i) = TrueRate(EffectsNow(), group_times.back(), rates.col(i));
+      }
+    }
     const int64_t id = next_group_++;
     graph_.AddBlock(
         RatesBlock(id),
         {Geometry::kEuclidean, Eigen::Map<const Eigen::VectorXd>(rates.data(), rates.size()), {}});
-    group.factor = graph_.AddFactor(std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s),
-                                    {RatesBlock(id), BiasBlock(group.bias_index)});
+    group.factor = graph_.AddFactor(std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s,
+                                                               Effects(), std::move(group_times)),
+                                    std::move(rate_blocks));
     groups_.emplace(id, group);
     groups->push_back(id);
   }
@@ -170,13 +208,12 @@ AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, std::vector<
   return AddPairResult::kAdded;
 }
 
-AddPairResult PairGraph::AddPair(int64_t id, double time_a_s, double time_b_s,
+AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const FrameTime& frame_b,
                                  const std::vector<Match>& matches) {
   CHECK(pairs_.count(id) == 0);
   const LensParameters lens = graph_.value(kLensBlock);
-  const Eigen::VectorXd& shutter = graph_.value(kShutterBlock);
   Pair pair;
-  pair.time_s = time_a_s;
+  pair.time_s = frame_a.stamp_s;
   pair.measurement = std::make_shared<PairMeasurement>();
   PairMeasurement& m = *pair.measurement;
   m.lens = &GetLens(prior_mean_.distortion_model);
@@ -188,15 +225,15 @@ AddPairResult PairGraph::AddPair(int64_t id, double time_a_s, double time_b_s,
     }
   }
   if (static_cast<int>(m.matches.size()) < kMinMatches) return AddPairResult::kTooFewMatches;
-  const double readout = shutter[kReadout];
-  const double from = time_a_s + shutter[kDelay] + std::min(0.0, readout) - options_.rate_margin_s;
-  const double to = time_b_s + shutter[kDelay] + std::max(0.0, readout) + options_.rate_margin_s;
+  const auto [first, last] = Exposures(frame_a, frame_b);
   const AddPairResult covered =
-      CoverWithRates(from, to, &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
+      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, &pair.groups,
+                     &m.rate_times_s, &m.rate_group_sizes);
   if (covered != AddPairResult::kAdded) return covered;
-  m.time_a_s = time_a_s;
-  m.time_b_s = time_b_s;
-  m.height_px = prior_mean_.height_px;
+  m.frame_a = frame_a;
+  m.frame_b = frame_b;
+  m.size_px << prior_mean_.width_px, prior_mean_.height_px;
+  m.effects = Effects();
   m.sigma_px = options_.sigma_px;
   m.noise = options_.match_noise;
   m.robust_threshold = options_.robust_threshold;
@@ -209,6 +246,7 @@ AddPairResult PairGraph::AddPair(int64_t id, double time_a_s, double time_b_s,
     blocks.push_back(TurnBlock(id));
     graph_.AddFactor(turn_prior_, {TurnBlock(id)});
   }
+  if (num_effects_ > 0) blocks.push_back(kEffectsBlock);
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
   if (options_.residual == ResidualKind::kPlane) {
     pair.factor = graph_.AddFactor(std::make_shared<CoplanarityPlane>(pair.measurement), blocks);
@@ -224,24 +262,26 @@ AddPairResult PairGraph::AddPair(int64_t id, double time_a_s, double time_b_s,
   return AddPairResult::kAdded;
 }
 
-AddPairResult PairGraph::AddRotation(int64_t id, double time_a_s, double time_b_s,
+AddPairResult PairGraph::AddRotation(int64_t id, const FrameTime& frame_a, const FrameTime& frame_b,
                                      const Eigen::Quaterniond& q_a_b, double sigma_rad) {
   CHECK(pairs_.count(id) == 0);
-  const double delay = graph_.value(kShutterBlock)[kDelay];
   Pair pair;
-  pair.time_s = time_a_s;
+  pair.time_s = frame_a.stamp_s;
   pair.rotation = std::make_shared<RelativeRotation::Measurement>();
   RelativeRotation::Measurement& m = *pair.rotation;
-  const AddPairResult covered = CoverWithRates(time_a_s + delay - options_.rate_margin_s,
-                                               time_b_s + delay + options_.rate_margin_s,
-                                               &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
+  const auto [first, last] = Exposures(frame_a, frame_b);
+  const AddPairResult covered =
+      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, &pair.groups,
+                     &m.rate_times_s, &m.rate_group_sizes);
   if (covered != AddPairResult::kAdded) return covered;
   m.q_a_b = q_a_b;
-  m.time_a_s = time_a_s;
-  m.time_b_s = time_b_s;
+  m.frame_a = frame_a;
+  m.frame_b = frame_b;
+  m.effects = Effects();
   m.sigma_rad = sigma_rad;
   m.robust_threshold = options_.robust_threshold;
   std::vector<BlockId> blocks = {kShutterBlock, kRotationBlock};
+  if (num_effects_ > 0) blocks.push_back(kEffectsBlock);
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
   pair.factor = graph_.AddFactor(std::make_shared<RelativeRotation>(pair.rotation), blocks);
   pairs_.emplace(id, std::move(pair));
@@ -301,14 +341,6 @@ std::vector<int64_t> PairGraph::pair_ids() const {
   return ids;
 }
 
-std::vector<const double*> PairGraph::PairParameters(const Pair& pair) const {
-  std::vector<const double*> p = {graph_.value(kLensBlock).data(),
-                                  graph_.value(kShutterBlock).data(),
-                                  graph_.value(kRotationBlock).data()};
-  for (const int64_t group : pair.groups) p.push_back(graph_.value(RatesBlock(group)).data());
-  return p;
-}
-
 std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const Pair& pair = pairs_.at(id);
   std::vector<double> residuals;
@@ -316,22 +348,29 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
     residuals.resize(3);
     std::vector<const double*> p = {graph_.value(kShutterBlock).data(),
                                     graph_.value(kRotationBlock).data()};
+    if (num_effects_ > 0) p.push_back(EffectsNow().values);
     for (const int64_t group : pair.groups) p.push_back(graph_.value(RatesBlock(group)).data());
     CHECK(graph_.factors().at(pair.factor).cost->Evaluate(p.data(), residuals.data(), nullptr));
     return residuals;
   }
   const PairMeasurement& m = *pair.measurement;
-  const std::vector<const double*> p = PairParameters(pair);
-  const RotationChain chain(m.rate_times_s, GatherRates(m.rate_group_sizes, p.data() + 3));
+  std::vector<const double*> groups;
+  for (const int64_t group : pair.groups) groups.push_back(graph_.value(RatesBlock(group)).data());
+  const RotationChain chain(m.rate_times_s, GatherRates(m.rate_group_sizes, groups.data()));
+  const double readout = graph_.value(kShutterBlock)[kReadout];
   PairBearings bearings;
-  if (!EvaluatePairBearings(m, chain, p[0], p[1], p[2], false, &bearings)) return residuals;
+  if (!EvaluatePairBearings(m, chain, graph_.value(kLensBlock).data(),
+                            graph_.value(kShutterBlock).data(), graph_.value(kRotationBlock).data(),
+                            EffectsNow().values, false, &bearings)) {
+    return residuals;
+  }
   if (options_.residual != ResidualKind::kPlane) {
     return FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold).residuals;
   }
   const Eigen::Vector3d tau = graph_.value(DirectionBlock(id)), turn = graph_.value(TurnBlock(id));
   double cost = 0.0;
   for (size_t i = 0; i < m.matches.size(); ++i) {
-    const double share = p[1][kReadout] * CoplanarityPlane::RowShare(m, m.matches[i]);
+    const double share = readout * CoplanarityPlane::RowShare(m, m.matches[i]);
     residuals.push_back(EvaluatePlaneResidual(bearings.a[i].ray_ref, bearings.a[i].J_ray_px,
                                               bearings.b[i].ray_ref, bearings.b[i].J_ray_px,
                                               tau + share * turn, m.variance_a(), m.variance_b())
@@ -366,11 +405,13 @@ Calibration PairGraph::Estimate() const {
     ++count;
   }
   c.bias_gyro_rad_s = count > 0 ? Eigen::Vector3d(sum / count) : start_bias_;
+  if (num_effects_ > 0) c.effect_values = graph_.value(kEffectsBlock);
   return c;
 }
 
 bool PairGraph::EstimateCovariance(double cluster_s, Calibration* calibration) const {
-  std::vector<FactorGraph::Functional> functionals(kStateSize);
+  const int size = kStateSize + num_effects_;
+  std::vector<FactorGraph::Functional> functionals(static_cast<size_t>(size));
   functionals[kStateFocal] = {{kLensBlock, 0}};
   functionals[kStateCx] = {{kLensBlock, 1}};
   functionals[kStateCy] = {{kLensBlock, 2}};
@@ -387,15 +428,17 @@ bool PairGraph::EstimateCovariance(double cluster_s, Calibration* calibration) c
     }
     functionals[kStateRotation + k] = {{kRotationBlock, k}};
   }
+  for (int i = 0; i < num_effects_; ++i) {
+    functionals[static_cast<size_t>(kStateSize + i)] = {{kEffectsBlock, i}};
+  }
   const FactorGraph::CovarianceReport report = graph_.Covariance(functionals);
   if (!report.usable) return false;
-  calibration->covariance = report.covariance;
 
   // Clustered covariance: the sum over stretches of time of each stretch's influence.
-  std::map<int64_t, StateVector> clusters;
+  std::map<int64_t, Eigen::VectorXd> clusters;
   const auto add = [&](FactorGraph::FactorKey key, double time_s) {
     const auto cluster = static_cast<int64_t>(std::floor(time_s / cluster_s));
-    auto [it, fresh] = clusters.try_emplace(cluster, StateVector::Zero());
+    auto [it, fresh] = clusters.try_emplace(cluster, Eigen::VectorXd::Zero(size));
     it->second += report.influence.at(key);
   };
   for (const auto& entry : pairs_) add(entry.second.factor, entry.second.time_s);
@@ -403,14 +446,17 @@ bool PairGraph::EstimateCovariance(double cluster_s, Calibration* calibration) c
     add(entry.second.factor, sample(entry.second.first_sample).time_s - calibration->delay_s);
   }
   const auto count = static_cast<double>(clusters.size());
-  if (clusters.size() < 8) return true;
-  StateVector variance = StateVector::Zero();
-  for (const auto& entry : clusters) variance += entry.second.cwiseAbs2();
-  variance *= count / (count - 1.0);
-  const StateVector inflation =
-      (variance.cwiseQuotient(calibration->covariance.diagonal())).cwiseMax(1.0).cwiseSqrt();
-  calibration->covariance =
-      inflation.asDiagonal() * calibration->covariance * inflation.asDiagonal();
+  Eigen::MatrixXd covariance = report.covariance;
+  if (clusters.size() >= 8) {
+    Eigen::VectorXd variance = Eigen::VectorXd::Zero(size);
+    for (const auto& entry : clusters) variance += entry.second.cwiseAbs2();
+    variance *= count / (count - 1.0);
+    const Eigen::VectorXd inflation =
+        (variance.cwiseQuotient(covariance.diagonal())).cwiseMax(1.0).cwiseSqrt();
+    covariance = inflation.asDiagonal() * covariance * inflation.asDiagonal();
+  }
+  calibration->covariance = covariance.topLeftCorner<kStateSize, kStateSize>();
+  calibration->effect_covariance = covariance.bottomRightCorner(num_effects_, num_effects_);
   return true;
 }
 

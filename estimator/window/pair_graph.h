@@ -8,6 +8,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/calibration.h"
@@ -54,8 +55,8 @@ class PairGraph {
  public:
   static constexpr int kMinMatches = 8;
 
-  // start: values, and prior_sigma as the standard deviations of a Gaussian prior around
-  // `prior_mean` (zero bias, guess of the files, ...).
+  // start: values with effects, and prior_sigma as the standard deviations of a Gaussian prior
+  // around `prior_mean` (zero bias, guess of the files, no effects, ...).
   PairGraph(const Calibration& start, const Calibration& prior_mean,
             const PairGraphOptions& options);
 
@@ -63,10 +64,10 @@ class PairGraph {
   void AddRate(const TimedRate& rate);
   // Adds the coplanarity of a pair; pairs come in the order of their first frame. Times are
   // recorded stamps in seconds from the graph's origin.
-  AddPairResult AddPair(int64_t id, double time_a_s, double time_b_s,
+  AddPairResult AddPair(int64_t id, const FrameTime& frame_a, const FrameTime& frame_b,
                         const std::vector<Match>& matches);
   // Adds a rotation between two camera attitudes (no pixels). sigma_rad > 0 per axis.
-  AddPairResult AddRotation(int64_t id, double time_a_s, double time_b_s,
+  AddPairResult AddRotation(int64_t id, const FrameTime& frame_a, const FrameTime& frame_b,
                             const Eigen::Quaterniond& q_a_b, double sigma_rad);
 
   SolveReport Solve(const SolveOptions& options);
@@ -110,6 +111,13 @@ class PairGraph {
     double time_s = 0.0;
   };
 
+  // Null without effects that have parameters.
+  std::shared_ptr<const EffectSet> Effects() const {
+    return prior_mean_.effects && prior_mean_.effects->size() > 0 ? prior_mean_.effects : nullptr;
+  }
+  PairEffects EffectsNow() const;
+  // First and last exposure of a pair with the present estimate [s].
+  std::pair<double, double> Exposures(const FrameTime& frame_a, const FrameTime& frame_b) const;
   // Makes the rate groups that cover [from_s, to_s] on the gyro clock; fills their ids.
   AddPairResult CoverWithRates(double from_s, double to_s, std::vector<int64_t>* groups,
                                std::vector<double>* times, std::vector<int>* sizes);
@@ -117,7 +125,6 @@ class PairGraph {
   const TimedRate& sample(int64_t number) const {
     return samples_[static_cast<size_t>(number - first_sample_)];
   }
-  std::vector<const double*> PairParameters(const Pair& pair) const;
 
   PairGraphOptions options_;
   Calibration prior_mean_;
@@ -127,6 +134,7 @@ class PairGraph {
   std::deque<TimedRate> samples_;
   int64_t first_sample_ = 0;  // absolute number of samples_.front()
   double median_interval_s_ = 0.0;
+  int num_effects_ = 0;                  // parameters of all effects
   std::map<int64_t, RateGroup> groups_;  // by id, in time order
   int64_t next_group_ = 0;
   std::map<int64_t, Pair> pairs_;

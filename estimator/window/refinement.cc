@@ -6,10 +6,32 @@
 
 #include "core/robust_statistics.h"
 #include "estimator/window/direction_search.h"
+#include "estimator/window/pair_view.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/robust.h"
 
 namespace camgyro {
+namespace {
+
+// How far two calibrations with the same effects differ in the times of exposure, at the middle
+// row, over some pairs [s].
+double LargestShift(const std::vector<TimedPair>& pairs, const Calibration& a,
+                    const Calibration& b) {
+  if (a.pair_effects().set == nullptr) return std::abs(a.delay_s - b.delay_s);
+  double largest = 0.0;
+  EffectSet::Change change;
+  const Eigen::Vector2d size(a.width_px, a.height_px);
+  for (const TimedPair& pair : pairs) {
+    a.effects->ChangeObservation({0.5 * size, size, pair.first()}, &change);
+    const double shift =
+        a.delay_s - b.delay_s + change.time.row(0).dot(a.effect_values - b.effect_values);
+    largest = std::max(largest, std::abs(shift));
+  }
+  return largest;
+}
+
+}  // namespace
+
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                        const Calibration& start, const Calibration& prior_mean,
                        const RefinementOptions& options) {
@@ -30,15 +52,15 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     scale *= std::max(1e-3, relative);
     for (const int64_t id : ids) graph->SetSigma(id, scale);
   };
-  double built_at_delay_s = 0.0, last_cost = 0.0;
+  Calibration built_at;
+  double last_cost = 0.0;
   for (result.rounds = 1; result.rounds <= options.max_rounds; ++result.rounds) {
     const Calibration before = result.calibration;
     // Rates are kept around the pairs as the delay was when they were added.
-    const bool build = graph == nullptr || std::abs(before.delay_s - built_at_delay_s) >
-                                               0.5 * graph_options.rate_margin_s;
-    if (build) {
+    if (graph == nullptr ||
+        LargestShift(pairs, before, built_at) > 0.5 * graph_options.rate_margin_s) {
       graph_options.sigma_px = scale;
-      built_at_delay_s = before.delay_s;
+      built_at = before;
       Calibration from = before;
       from.prior_sigma = start.prior_sigma;
       graph = std::make_unique<PairGraph>(from, prior_mean, graph_options);
@@ -46,9 +68,9 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
       result.skipped_pairs = 0;
       for (const TimedPair& pair : pairs) {
         const AddPairResult added =
-            rotations ? graph->AddRotation(pair.id, pair.time_a_s, pair.time_b_s,
+            rotations ? graph->AddRotation(pair.id, pair.first(), pair.second(),
                                            pair.rotation.q_a_b, scale)
-                      : graph->AddPair(pair.id, pair.time_a_s, pair.time_b_s, pair.matches);
+                      : graph->AddPair(pair.id, pair.first(), pair.second(), pair.matches);
         if (added != AddPairResult::kAdded) ++result.skipped_pairs;
       }
       if (graph->num_pairs() < 10) {
@@ -113,37 +135,15 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
                          const PairGraphOptions& options) {
   UnseenFit fit;
   double sum_sq = 0.0;
-  const Lens& lens = GetLens(calibration.distortion_model);
-  const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);
-  const Eigen::Matrix3d R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
-  const double variance_b = noise_px * noise_px;
-  const double variance_a = options.match_noise == MatchNoise::kBothImages ? variance_b : 0.0;
+  PairView view;
   for (const TimedPair& pair : pairs) {
-    const double from = pair.time_a_s + calibration.delay_s + std::min(0.0, calibration.readout_s);
-    const double to = pair.time_b_s + calibration.delay_s + std::max(0.0, calibration.readout_s);
-    const auto by_time = [](const TimedRate& rate, double t) { return rate.time_s < t; };
-    auto first = std::lower_bound(input.rates.begin(), input.rates.end(), from, by_time);
-    auto last = std::lower_bound(input.rates.begin(), input.rates.end(), to, by_time);
-    if (first == input.rates.begin() || last == input.rates.end()) continue;
-    --first;
-    ++last;
-    std::vector<double> times;
-    Eigen::Matrix3Xd rates(3, last - first);
-    for (auto it = first; it != last; ++it) {
-      rates.col(it - first) = it->omega_gyro_rad_s - calibration.bias_gyro_rad_s;
-      times.push_back(it->time_s);
-    }
-    const RotationChain chain(times, rates);
+    if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
+    const double variance_a = view.measurement.variance_a();
+    const double variance_b = view.measurement.variance_b();
     std::array<PairBearings, 2> halves;  // for the direction, and for the residuals
-    for (size_t i = 0; i < pair.matches.size(); ++i) {
-      Bearing a, b;
-      if (EvaluateBearing(lens, calibration.lens, shutter, R_gyro_cam, chain, pair.time_a_s,
-                          calibration.height_px, pair.matches[i].px_a, &a, false) &&
-          EvaluateBearing(lens, calibration.lens, shutter, R_gyro_cam, chain, pair.time_b_s,
-                          calibration.height_px, pair.matches[i].px_b, &b, false)) {
-        halves[i % 2].a.push_back(a);
-        halves[i % 2].b.push_back(b);
-      }
+    for (size_t i = 0; i < view.bearings.a.size(); ++i) {
+      halves[i % 2].a.push_back(view.bearings.a[i]);
+      halves[i % 2].b.push_back(view.bearings.b[i]);
     }
     if (halves[0].a.size() < PairGraph::kMinMatches / 2) continue;
     ++fit.pairs;

@@ -29,16 +29,18 @@ AddResult SlidingWindow::AddGyroSample(const GyroSample& sample) {
   return AddResult::kAccepted;
 }
 
-AddResult SlidingWindow::AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns,
-                                 std::vector<Match> matches) {
+AddResult SlidingWindow::AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns, std::vector<Match> matches,
+                                 double exposure_a_s, double exposure_b_s) {
   for (const Match& match : matches) {
     if (!match.px_a.allFinite() || !match.px_b.allFinite()) return AddResult::kNotFinite;
   }
   const double time_a_s = SecondsSince(origin_ns_, stamp_a_ns);
   if (stamp_b_ns <= stamp_a_ns || time_a_s < last_pair_time_s_) return AddResult::kNotIncreasing;
   last_pair_time_s_ = time_a_s;
-  pending_.push_back(
-      {stamp_b_ns, time_a_s, SecondsSince(origin_ns_, stamp_b_ns), std::move(matches)});
+  pending_.push_back({stamp_b_ns,
+                      {time_a_s, exposure_a_s},
+                      {SecondsSince(origin_ns_, stamp_b_ns), exposure_b_s},
+                      std::move(matches)});
   ProcessPending();
   if (pending_.size() > kMaxPending) {  // the gyro is silent
     pending_.pop_front();
@@ -51,7 +53,7 @@ void SlidingWindow::ProcessPending() {
   while (!pending_.empty()) {
     const Pending& next = pending_.front();
     const AddPairResult added =
-        graph_.AddPair(next_pair_id_, next.time_a_s, next.time_b_s, next.matches);
+        graph_.AddPair(next_pair_id_, next.frame_a, next.frame_b, next.matches);
     if (added == AddPairResult::kGyroTooLate) return;
     if (added == AddPairResult::kAdded) {
       ++next_pair_id_;
@@ -61,7 +63,7 @@ void SlidingWindow::ProcessPending() {
       ++num_skipped_;
     }
     // A pair to come starts after this one; its delay may still move, but not by a second.
-    graph_.ForgetOldRates(next.time_a_s + latest_.estimate.delay_s - 1.0);
+    graph_.ForgetOldRates(next.frame_a.stamp_s + latest_.estimate.delay_s - 1.0);
     pending_.pop_front();
   }
 }

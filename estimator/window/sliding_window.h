@@ -54,8 +54,11 @@ class SlidingWindow {
   // Bad data are refused by the result and change nothing.
   [[nodiscard]] AddResult AddGyroSample(const GyroSample& sample);
   // A pair waits inside until the gyro has passed it. stamp_a may not go back.
+  // Exposures in seconds, NaN if they are not known: only effects need them.
   [[nodiscard]] AddResult AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns,
-                                  std::vector<Match> matches);
+                                  std::vector<Match> matches,
+                                  double exposure_a_s = std::numeric_limits<double>::quiet_NaN(),
+                                  double exposure_b_s = std::numeric_limits<double>::quiet_NaN());
 
   // Called with every solved window, in order.
   void SetListener(std::function<void(const WindowUpdate&)> listener) {
@@ -71,7 +74,7 @@ class SlidingWindow {
  private:
   struct Pending {
     int64_t stamp_b_ns = 0;
-    double time_a_s = 0.0, time_b_s = 0.0;
+    FrameTime frame_a, frame_b;
     std::vector<Match> matches;
   };
 

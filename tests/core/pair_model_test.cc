@@ -112,5 +112,64 @@ TEST(PairModel, BackpropagationMatchesDifferences) {
   }
 }
 
+// Lens, clock and row effects together, through a recording that has what they need.
+TEST(PairModel, BackpropagationByEffectsMatchesDifferences) {
+  EffectSetup setup;
+  setup.size_px << 752.0, 480.0;
+  for (int i = 0; i < 30; ++i) setup.frames.push_back({i / 3.0, 0.003 + 0.001 * (i % 5)});
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  setup.gyro_rad_s.resize(3, 2400);
+  for (int i = 0; i < 2400; ++i) {
+    setup.gyro_times_s.push_back(0.005 * i);
+    setup.gyro_rad_s.col(i) << std::sin(0.02 * i), std::cos(0.03 * i), std::sin(0.01 * i);
+  }
+  const Result<EffectSet> set = MakeEffects(
+      "radial_distortion,tangential_distortion,aspect_ratio,focal_drift:curve,"
+      "optical_stabilisation:0.5,clock_skew,delay_step:4.1,delay_wander,readout_direction,"
+      "readout_nonlinear,exposure_delay",
+      setup);
+  ASSERT_TRUE(set) << set.error().message;
+  const int size = set->size();
+  Eigen::VectorXd values(size);
+  for (int i = 0; i < size; ++i) values[i] = 0.02 * set->parameter(i).spread * normal(generator);
+
+  const Vector3d by_ray(0.7, -1.1, 0.4);
+  const Matrix32 by_J = (Matrix32() << 300, -200, 100, 150, -250, 50).finished();
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    SCOPED_TRACE(seed);
+    Case c = RandomCase(seed);
+    c.frame_time_s = 5.02;
+    for (double& t : c.times) t += 5.0;
+    const FrameTime frame(c.frame_time_s, 0.006);
+    const auto evaluate = [&](const Eigen::VectorXd& v, Bearing* bearing) {
+      return EvaluateBearing(GetLens(DistortionModel::kRadTan), c.lens, c.shutter,
+                             c.q_gyro_cam.toRotationMatrix(), RotationChain(c.times, c.rates),
+                             frame, {752.0, 480.0}, c.px, {&*set, v.data()}, bearing);
+    };
+    Bearing bearing;
+    ASSERT_TRUE(evaluate(values, &bearing));
+    PairGradient gradient;
+    Eigen::Matrix3Xd by_rates = Eigen::Matrix3Xd::Zero(3, 10);
+    Backpropagate(bearing, RotationChain(c.times, c.rates), 480.0, by_ray, by_J, &gradient,
+                  by_rates);
+    ASSERT_EQ(gradient.by_effects.size(), size);
+    for (int k = 0; k < size; ++k) {
+      const double h = 1e-4 * set->parameter(k).spread;
+      double difference = 0.0;
+      for (const double sign : {1.0, -1.0}) {
+        Eigen::VectorXd moved = values;
+        moved[k] += sign * h;
+        Bearing b;
+        ASSERT_TRUE(evaluate(moved, &b));
+        difference +=
+            sign * (by_ray.dot(b.ray_ref) + by_J.cwiseProduct(b.J_ray_px).sum()) / (2.0 * h);
+      }
+      EXPECT_NEAR(gradient.by_effects[k], difference, 1e-5 * (1.0 + std::abs(difference)))
+          << set->items().size() << " " << set->parameter(k).name;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace camgyro

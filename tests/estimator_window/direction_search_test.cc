@@ -23,6 +23,7 @@ PairBearings BearingsOf(PairScene* s) {
                             GatherRates(s->pair->rate_group_sizes, parameters.data() + 3));
   PairBearings bearings;
   EXPECT_TRUE(EvaluatePairBearings(*s->pair, chain, parameters[0], parameters[1], parameters[2],
+                                   nullptr,
                                    /*derivatives=*/false, &bearings));
   return bearings;
 }

@@ -179,11 +179,12 @@ FactorGraph RotationProblem(int groups) {
                     {Rates(g), Bias(0)});
     if (g == 0) continue;
     auto m = std::make_shared<RelativeRotation::Measurement>();
-    m->time_a_s = times[static_cast<size_t>(4 * g - 4)] + 0.012;
-    m->time_b_s = times[static_cast<size_t>(4 * g)] + 0.022;
-    m->q_a_b = Eigen::Quaterniond(q_gyro_cam.toRotationMatrix().transpose() *
-                                  chain.At(m->time_a_s).R_ref_gyro.transpose() *
-                                  chain.At(m->time_b_s).R_ref_gyro * q_gyro_cam.toRotationMatrix());
+    m->frame_a.stamp_s = times[static_cast<size_t>(4 * g - 4)] + 0.012;
+    m->frame_b.stamp_s = times[static_cast<size_t>(4 * g)] + 0.022;
+    m->q_a_b =
+        Eigen::Quaterniond(q_gyro_cam.toRotationMatrix().transpose() *
+                           chain.At(m->frame_a.stamp_s).R_ref_gyro.transpose() *
+                           chain.At(m->frame_b.stamp_s).R_ref_gyro * q_gyro_cam.toRotationMatrix());
     m->q_a_b = m->q_a_b * Exp(Vector3d(0.002 * random.Vector(3)));
     m->sigma_rad = 0.002;
     for (int i = 4 * g - 4; i < 4 * g + 4; ++i) m->rate_times_s.push_back(times[size_t(i)]);

@@ -48,9 +48,9 @@ inline PairScene MakePairScene(uint64_t seed, int num_matches = 12) {
   s.shutter << 0.006, 0.025;
   s.q_gyro_cam = Exp(random_vector());
   s.tau = random_vector().normalized();
-  s.pair->time_a_s = 1.0;
-  s.pair->time_b_s = 1.0 + 1.0 / 30;
-  s.pair->height_px = 480.0;
+  s.pair->frame_a.stamp_s = 1.0;
+  s.pair->frame_b.stamp_s = 1.0 + 1.0 / 30;
+  s.pair->size_px << 752.0, 480.0;
   s.pair->sigma_px = 0.5;
   s.pair->lens = &GetLens(DistortionModel::kRadTan);
   s.pair->rate_group_sizes = {6, 7, 3};
@@ -89,7 +89,8 @@ inline PairScene MakePairScene(uint64_t seed, int num_matches = 12) {
     if (!s.pair->lens->Unproject(start, s.lens, &jet)) continue;
     const double depth = 1.5 + 18.5 * uniform(generator);
     const Eigen::Vector3d point = R_ref_cam_middle * (depth * jet.ray);
-    const auto a = project(point, s.pair->time_a_s), b = project(point, s.pair->time_b_s);
+    const auto a = project(point, s.pair->frame_a.stamp_s),
+               b = project(point, s.pair->frame_b.stamp_s);
     if (a && b) s.pair->matches.push_back({*a, *b});
   }
   return s;

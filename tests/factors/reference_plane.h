@@ -71,7 +71,7 @@ void RayAndJacobian(const PairMeasurement& pair, const T* lens, const T* shutter
   const Vec3<T> by_u(D(1, 1) / det / fx, -D(1, 0) / det / fx, T(0));
   const Vec3<T> by_v(-D(0, 1) / det / fy, D(0, 0) / det / fy, T(0));
 
-  const T line_delay = shutter[1] / T(pair.height_px);
+  const T line_delay = shutter[1] / T(pair.size_px.y());
   const T time = T(stamp) + shutter[0] + line_delay * T(px.y());
   const Eigen::Matrix<T, 3, 3> R_gyro_cam =
       Eigen::Quaternion<T>(q[3], q[0], q[1], q[2]).toRotationMatrix();
@@ -101,12 +101,13 @@ T Plane(const PairMeasurement& pair, const Match& match, const T* lens, const T*
         const T* q, const Vec3<T>& tau0, const Vec3<T>& turn, const std::vector<T>& rates) {
   using std::sqrt;
   const T middle_row((match.px_a.y() + match.px_b.y()) / 2);
-  const T from_middle_s = shutter[1] * (middle_row / T(pair.height_px) - T(0.5));
-  const Vec3<T> tau = tau0 + turn * (from_middle_s / T(pair.time_b_s - pair.time_a_s));
+  const T from_middle_s = shutter[1] * (middle_row / T(pair.size_px.y()) - T(0.5));
+  const Vec3<T> tau =
+      tau0 + turn * (from_middle_s / T(pair.frame_b.stamp_s - pair.frame_a.stamp_s));
   Vec3<T> a, b;
   Mat32<T> A, B;
-  RayAndJacobian(pair, lens, shutter, q, rates, match.px_a, pair.time_a_s, &a, &A);
-  RayAndJacobian(pair, lens, shutter, q, rates, match.px_b, pair.time_b_s, &b, &B);
+  RayAndJacobian(pair, lens, shutter, q, rates, match.px_a, pair.frame_a.stamp_s, &a, &A);
+  RayAndJacobian(pair, lens, shutter, q, rates, match.px_b, pair.frame_b.stamp_s, &b, &B);
   T variance(0);
   for (int k = 0; k < 2; ++k) {
     const T by_a = tau.dot(Vec3<T>(A.col(k)).cross(b)), by_b = tau.dot(a.cross(Vec3<T>(B.col(k))));
@@ -122,8 +123,10 @@ T Determinant(const PairMeasurement& pair, const Match* const* matches, const T*
   Vec3<T> a[3], b[3], n[3];
   Mat32<T> A[3], B[3];
   for (int i = 0; i < 3; ++i) {
-    RayAndJacobian(pair, lens, shutter, q, rates, matches[i]->px_a, pair.time_a_s, &a[i], &A[i]);
-    RayAndJacobian(pair, lens, shutter, q, rates, matches[i]->px_b, pair.time_b_s, &b[i], &B[i]);
+    RayAndJacobian(pair, lens, shutter, q, rates, matches[i]->px_a, pair.frame_a.stamp_s, &a[i],
+                   &A[i]);
+    RayAndJacobian(pair, lens, shutter, q, rates, matches[i]->px_b, pair.frame_b.stamp_s, &b[i],
+                   &B[i]);
     n[i] = a[i].cross(b[i]);
   }
   const auto det = [](const Vec3<T>& x, const Vec3<T>& y, const Vec3<T>& z) {

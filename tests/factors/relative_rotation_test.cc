@@ -45,8 +45,8 @@ Scene MakeScene(uint64_t seed) {
   s.shutter << 0.012, 0.02;
   s.q_gyro_cam = Exp(random_vector());
   auto& m = s.measurement;
-  m.time_a_s = 0.02;
-  m.time_b_s = 0.09;
+  m.frame_a.stamp_s = 0.02;
+  m.frame_b.stamp_s = 0.09;
   m.row_fraction = 0.5;
   m.sigma_rad = 0.002;
   m.rate_group_sizes = {5, 8};
@@ -59,8 +59,8 @@ Scene MakeScene(uint64_t seed) {
   const RotationChain chain(m.rate_times_s, rates);
   const Eigen::Matrix3d R_c = s.q_gyro_cam.toRotationMatrix();
   const double shift = 0.012 + 0.5 * 0.02;
-  m.q_a_b = Quaterniond((chain.At(m.time_a_s + shift).R_ref_gyro * R_c).transpose() *
-                        chain.At(m.time_b_s + shift).R_ref_gyro * R_c);
+  m.q_a_b = Quaterniond((chain.At(m.frame_a.stamp_s + shift).R_ref_gyro * R_c).transpose() *
+                        chain.At(m.frame_b.stamp_s + shift).R_ref_gyro * R_c);
   return s;
 }
 

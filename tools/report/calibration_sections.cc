@@ -114,6 +114,29 @@ std::string TimesText(double ratio) {
   return ratio < 10.0 ? FormatText("%.1f", ratio) : FormatText("%.0f", ratio);
 }
 
+// Parameters of the effects in the model, in the units of calibration.yaml; empty without effects.
+std::string EffectsTable(const Calibration& c) {
+  if (!c.effects || c.effects->items().empty()) return "";
+  ReportTable table;
+  table.header = {"effect", "parameter", "value", "± sigma", "unit"};
+  for (size_t i = 0; i < c.effects->items().size(); ++i) {
+    const EffectSet::Item& item = c.effects->items()[i];
+    if (item.effect->size() == 0) table.rows.push_back({{item.entry->name, "", 0.0}});
+    for (int k = 0; k < item.effect->size(); ++k) {
+      const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+      const double value = c.effect_values[item.first + k];
+      const double sigma = std::sqrt(c.effect_covariance(item.first + k, item.first + k));
+      const std::string key = FormatText("effects.%zu.parameters.%d.", i, k);
+      table.rows.push_back({{k == 0 ? item.entry->name : "", "", 0.0},
+                            {p.name, "", 0.0},
+                            {FormatText("%.4g", value), key + "value", value},
+                            {FormatText("%.2g", sigma), key + "sigma", sigma},
+                            {p.unit, "", 0.0}});
+    }
+  }
+  return "<h3>Effects in the model</h3>\n" + TableHtml(table);
+}
+
 }  // namespace
 
 ReportSection SummarySection(const CalibrationReport& report, bool attitudes) {
@@ -145,6 +168,7 @@ ReportSection SummarySection(const CalibrationReport& report, bool attitudes) {
           DescribePermutation(permutation) +
           ". Sigma: one standard deviation, of noise; what the model lacks is not in it.",
       "note");
+  html += EffectsTable(c);
   if (!report.doubts.empty()) html += "<h3>Doubts</h3>\n" + BulletList(report.doubts);
   if (!report.notes.empty()) html += "<h3>Notes</h3>\n" + BulletList(report.notes);
   return {"summary", "Result", html};

@@ -47,11 +47,12 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
   }
   if (pairs.empty()) return rotations;
   CameraGuess camera = recording.camera;
-  camera.aspect_ratio = calibration.lens[kAspect];
-  camera.principal_px = Eigen::Vector2d(calibration.lens[kCx], calibration.lens[kCy]);
-  camera.distortion_model = calibration.distortion_model;
-  camera.distortion.assign(calibration.lens.data() + kK1, calibration.lens.data() + kLensSize);
-  return CameraRotationsOf(SpreadPairs(pairs, kMaxCameraPoints), camera, calibration.lens[kFocal]);
+  const LensParameters lens = calibration.FullLens();
+  camera.aspect_ratio = lens[kAspect];
+  camera.principal_px = Eigen::Vector2d(lens[kCx], lens[kCy]);
+  camera.distortion_model = DistortionModel::kRadTan;  // of which the others are cases
+  camera.distortion.assign(lens.data() + kK1, lens.data() + kLensSize);
+  return CameraRotationsOf(SpreadPairs(pairs, kMaxCameraPoints), camera, lens[kFocal]);
 }
 
 std::vector<RatePoint> RatePoints(const Recording& recording, const Calibration& calibration) {

@@ -1,0 +1,136 @@
+#include "core/effects/catalogue.h"
+
+#include <algorithm>
+
+#include "core/effects/entries.h"
+
+namespace camgyro {
+
+const std::vector<EffectEntry>& EffectCatalogue() {
+  static const std::vector<EffectEntry> catalogue = {RadialDistortionEntry(),
+                                                     TangentialDistortionEntry(),
+                                                     AspectRatioEntry(),
+                                                     FocalDriftEntry(),
+                                                     OpticalStabilisationEntry(),
+                                                     ClockSkewEntry(),
+                                                     DelayStepEntry(),
+                                                     DelayWanderEntry(),
+                                                     ReadoutDirectionEntry(),
+                                                     ReadoutNonlinearEntry(),
+                                                     GyroScaleEntry(),
+                                                     GyroMisalignmentEntry(),
+                                                     GyroLowpassEntry(),
+                                                     GyroSaturationEntry(),
+                                                     BiasDriftEntry(),
+                                                     ExposureDelayEntry(),
+                                                     TranslationAccelerationEntry(),
+                                                     ElectronicStabilisationEntry()};
+  return catalogue;
+}
+
+const EffectEntry* FindEffect(const std::string& name) {
+  for (const EffectEntry& entry : EffectCatalogue()) {
+    if (entry.name == name) return &entry;
+  }
+  return nullptr;
+}
+
+void EffectSet::Add(const EffectEntry* entry, std::string shape,
+                    std::shared_ptr<const Effect> effect) {
+  const int columns = effect->size();
+  items_.push_back({entry, std::move(shape), std::move(effect), size_});
+  size_ += columns;
+}
+
+bool EffectSet::Has(const std::string& name) const {
+  return std::any_of(items_.begin(), items_.end(),
+                     [&](const Item& item) { return item.entry->name == name; });
+}
+
+EffectParameter EffectSet::parameter(int column) const {
+  for (const Item& item : items_) {
+    if (column < item.first + item.effect->size()) {
+      return item.effect->parameters()[static_cast<size_t>(column - item.first)];
+    }
+  }
+  return {};
+}
+
+void EffectSet::ChangeObservation(const Observation& observation, Change* change) const {
+  change->lens.setZero(kLensSize, size_);
+  change->time.setZero(3, size_);
+  for (const Item& item : items_) {
+    const int n = item.effect->size();
+    item.effect->ChangeLens(observation, change->lens.middleCols(item.first, n));
+    item.effect->ChangeTime(observation, change->time.middleCols(item.first, n));
+  }
+}
+
+void EffectSet::ChangeRate(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
+                           RateColumns columns) const {
+  columns.setZero();
+  for (const Item& item : items_) {
+    item.effect->ChangeRate(time_gyro_s, omega_gyro_rad_s,
+                            columns.middleCols(item.first, item.effect->size()));
+  }
+}
+
+Eigen::Matrix3d EffectSet::RateByRate(const double* values) const {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const Item& item : items_) sum += item.effect->RateByRate(values + item.first);
+  return sum;
+}
+
+LensParameters EffectSet::ConstantLens(const LensParameters& lens,
+                                       const Eigen::VectorXd& values) const {
+  LensParameters sum = lens;
+  for (const Item& item : items_) {
+    if (!item.effect->is_constant_lens()) continue;
+    const int n = item.effect->size();
+    Eigen::Matrix<double, kLensSize, Eigen::Dynamic> columns =
+        Eigen::Matrix<double, kLensSize, Eigen::Dynamic>::Zero(kLensSize, n);
+    item.effect->ChangeLens({}, columns);
+    sum += columns * values.segment(item.first, n);
+  }
+  return sum;
+}
+
+double EffectSet::turn_sigma_rad() const {
+  double sigma = 0.0;
+  for (const Item& item : items_) sigma = std::max(sigma, item.effect->turn_sigma_rad());
+  return sigma;
+}
+
+Result<EffectSet> MakeEffects(const std::string& list, const EffectSetup& setup) {
+  EffectSet set;
+  for (size_t begin = 0; begin < list.size();) {
+    const size_t end = std::min(list.find(',', begin), list.size());
+    const std::string word = list.substr(begin, end - begin);
+    begin = end + 1;
+    const std::string name = word.substr(0, word.find(':'));
+    std::string known;
+    for (const EffectEntry& entry : EffectCatalogue()) known += " " + entry.name;
+    const EffectEntry* entry = FindEffect(name);
+    if (entry == nullptr) {
+      return BadUsage("--effects: no effect \"" + name + "\"; expected some of" + known);
+    }
+    const std::vector<std::string> shapes = entry->shapes(setup);
+    const bool has_shape = name.size() < word.size();
+    if (!has_shape && shapes.empty()) {
+      return CannotEstimate("--effects: " + name +
+                            " has no parameters that this recording could determine");
+    }
+    const std::string shape = has_shape ? word.substr(name.size() + 1) : shapes.back();
+    std::shared_ptr<const Effect> effect = entry->make(setup, shape);
+    if (effect == nullptr) {
+      std::string expected;
+      for (const std::string& s : shapes) expected += " " + s;
+      return BadUsage("--effects: " + name + " has no shape \"" + shape + "\" here; expected" +
+                      (expected.empty() ? " a number within the recording" : expected));
+    }
+    set.Add(entry, shape, std::move(effect));
+  }
+  return set;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,71 @@
+// The catalogue of effects: one file per effect in this folder, registered in catalogue.cc.
+#ifndef CAMGYRO_CORE_EFFECTS_CATALOGUE_H_
+#define CAMGYRO_CORE_EFFECTS_CATALOGUE_H_
+
+#include <string>
+#include <vector>
+
+#include "core/effects/effect.h"
+#include "core/recording.h"
+#include "core/result.h"
+
+namespace camgyro {
+
+// All effects, in the order of design.md section 6.
+const std::vector<EffectEntry>& EffectCatalogue();
+
+// Null if there is none of this name.
+const EffectEntry* FindEffect(const std::string& name);
+
+// Some effects with their parameters side by side.
+class EffectSet {
+ public:
+  struct Item {
+    const EffectEntry* entry;
+    std::string shape;
+    std::shared_ptr<const Effect> effect;
+    int first = 0;  // column of its first parameter
+  };
+
+  // What all effects change at one observation; columns as the parameters of the set.
+  struct Change {
+    Eigen::Matrix<double, kLensSize, Eigen::Dynamic> lens;
+    Eigen::Matrix<double, 3, Eigen::Dynamic> time;
+  };
+
+  void Add(const EffectEntry* entry, std::string shape, std::shared_ptr<const Effect> effect);
+
+  const std::vector<Item>& items() const { return items_; }
+  int size() const { return size_; }
+  bool empty() const { return items_.empty(); }
+  bool Has(const std::string& name) const;
+  EffectParameter parameter(int column) const;
+
+  void ChangeObservation(const Observation& observation, Change* change) const;
+  void ChangeRate(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
+                  RateColumns columns) const;
+  Eigen::Matrix3d RateByRate(const double* values) const;
+  // The lens block with the effects that are a constant part of it.
+  LensParameters ConstantLens(const LensParameters& lens, const Eigen::VectorXd& values) const;
+  // The largest that an effect asks for; 0: none does.
+  double turn_sigma_rad() const;
+
+ private:
+  std::vector<Item> items_;
+  int size_ = 0;
+};
+
+// Effects of the catalogue at their present size. Both null: none.
+struct PairEffects {
+  const EffectSet* set = nullptr;
+  const double* values = nullptr;  // set->size() of them
+};
+
+// What the user asks for: "name" or "name:shape", separated by commas; without a shape, the last
+// (the most flexible) that the recording can show. Errors: kBadUsage for an unknown name (with the
+// nearest) or shape; kCannotEstimate if the recording cannot show the effect.
+Result<EffectSet> MakeEffects(const std::string& list, const EffectSetup& setup);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_CORE_EFFECTS_CATALOGUE_H_

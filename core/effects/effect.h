@@ -1,0 +1,110 @@
+// One effect of the catalogue: a way in which cameras and gyros differ from the plain model, as a
+// linear change of one part of the measurement function (design.md sections 2 and 6).
+#ifndef CAMGYRO_CORE_EFFECTS_EFFECT_H_
+#define CAMGYRO_CORE_EFFECTS_EFFECT_H_
+
+#include <Eigen/Core>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/lens.h"
+
+namespace camgyro {
+
+// The part of the measurement function that an effect changes; kPicture: what was recorded is not
+// what the lens imaged, so that no parameter repairs it.
+enum class ModelPart { kLens, kShutterClock, kRate, kBaseline, kPicture };
+
+struct EffectParameter {
+  std::string name;
+  std::string unit;
+  double spread;  // standard deviation of a weak prior around zero (no effect)
+  double plausible_min, plausible_max;  // what real devices show
+};
+
+// A frame, as effects of the clock may depend on it. Seconds after the first gyro stamp.
+struct FrameTime {
+  double stamp_s;     // recorded, camera clock
+  double exposure_s;  // NaN: not recorded
+  FrameTime(double stamp = 0.0, double exposure = std::numeric_limits<double>::quiet_NaN())
+      : stamp_s(stamp), exposure_s(exposure) {}
+};
+
+// One observed pixel.
+struct Observation {
+  Eigen::Vector2d px;
+  Eigen::Vector2d size_px;  // width, height of the picture
+  FrameTime frame;
+};
+
+// Columns: the parameters. What one unit of each changes:
+using LensColumns = Eigen::Ref<Eigen::Matrix<double, kLensSize, Eigen::Dynamic>>;  // lens block
+// Row 0: time of exposure [s]; rows 1, 2: its derivative by the pixel's u, v [s/px].
+using TimeColumns = Eigen::Ref<Eigen::Matrix<double, 3, Eigen::Dynamic>>;
+using RateColumns = Eigen::Ref<Eigen::Matrix3Xd>;  // the gyro's reading [rad/s]
+
+// Parameters zero: no effect. Functions write their columns, which come zeroed.
+class Effect {
+ public:
+  explicit Effect(std::vector<EffectParameter> parameters) : parameters_(std::move(parameters)) {}
+  virtual ~Effect() = default;
+  Effect(const Effect&) = delete;
+  Effect& operator=(const Effect&) = delete;
+
+  const std::vector<EffectParameter>& parameters() const { return parameters_; }
+  int size() const { return static_cast<int>(parameters_.size()); }
+
+  virtual void ChangeLens(const Observation& /*observation*/, LensColumns /*columns*/) const {}
+  virtual void ChangeTime(const Observation& /*observation*/, TimeColumns /*columns*/) const {}
+  // omega: true rate at that time, gyro frame [rad/s].
+  virtual void ChangeRate(double /*time_gyro_s*/, const Eigen::Vector3d& /*omega_gyro_rad_s*/,
+                          RateColumns /*columns*/) const {}
+  // Derivative of the changed reading by the true rate, less the identity, at parameters `values`.
+  virtual Eigen::Matrix3d RateByRate(const double* /*values*/) const {
+    return Eigen::Matrix3d::Zero();
+  }
+  // The change of the lens is the same for every pixel and all the time: a part of the lens block.
+  virtual bool is_constant_lens() const { return false; }
+  // Prior of the translation direction's turn that this effect needs [rad]; 0: as it is.
+  virtual double turn_sigma_rad() const { return 0.0; }
+
+ private:
+  const std::vector<EffectParameter> parameters_;
+};
+
+// What an effect may know of the recording that it is made for.
+struct EffectSetup {
+  Eigen::Vector2d size_px = Eigen::Vector2d::Zero();
+  std::vector<FrameTime> frames;          // at least two
+  std::vector<double> gyro_times_s;       // after the first gyro stamp
+  Eigen::Matrix3Xd gyro_rad_s;            // readings, one column per time
+  double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
+  Eigen::Matrix3d R_gyro_cam = Eigen::Matrix3d::Identity();
+  bool has_pixels = true;  // false: attitudes
+
+  // The frames' span on the gyro clock [s].
+  double from_s() const { return frames.front().stamp_s + delay_s; }
+  double to_s() const { return frames.back().stamp_s + delay_s; }
+};
+
+// An entry of the catalogue.
+struct EffectEntry {
+  std::string name;
+  ModelPart part;
+  std::string explanation;  // one sentence for people: what it is
+  std::string advice;       // what to do about it
+  // Shapes that this recording can show, by name, those with fewest parameters first; empty where
+  // it has not what the effect needs. Effects without parameters of their own have none.
+  std::function<std::vector<std::string>(const EffectSetup&)> shapes;
+  // The effect in a shape (also one with a number that shapes() does not list, where the entry's
+  // file says so); null if there is no such shape here.
+  std::function<std::shared_ptr<const Effect>(const EffectSetup&, const std::string& shape)> make;
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_CORE_EFFECTS_EFFECT_H_

@@ -1,0 +1,77 @@
+// A lens group that moves against fast rotation.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "core/effects/entries.h"
+
+namespace camgyro {
+namespace {
+
+// The picture shifts in proportion to the rotation above a corner frequency, about the camera's x
+// and y axes: angle' = omega - 2 pi corner angle, exact for rates that are linear between samples
+// up to the second order of the step. The shift is in px per rad: gain * f.
+class OpticalStabilisation final : public Effect {
+ public:
+  OpticalStabilisation(const EffectSetup& setup, double corner_hz)
+      : Effect({{"shift_per_rad", "px/rad", 500.0, 0.0, 1e4}}),
+        times_s_(setup.gyro_times_s),
+        delay_s_(setup.delay_s),
+        readout_s_(setup.readout_s) {
+    const double a = 2.0 * M_PI * corner_hz;
+    const auto n = static_cast<Eigen::Index>(times_s_.size());
+    const Eigen::Vector3d mean = setup.gyro_rad_s.rowwise().mean();  // the bias, nearly
+    const Eigen::Matrix3Xd omega =
+        setup.R_gyro_cam.transpose() * (setup.gyro_rad_s.colwise() - mean);
+    angle_.setZero(2, n);
+    for (Eigen::Index i = 1; i < n; ++i) {
+      const double dt = times_s_[static_cast<size_t>(i)] - times_s_[static_cast<size_t>(i) - 1];
+      const double decay = std::exp(-a * dt);
+      const Eigen::Vector2d input = 0.5 * (decay * omega.col(i - 1) + omega.col(i)).head<2>();
+      angle_.col(i) = decay * angle_.col(i - 1) + dt * input;
+    }
+  }
+  void ChangeLens(const Observation& o, LensColumns columns) const override {
+    const double t = o.frame.stamp_s + delay_s_ + readout_s_ * o.px.y() / o.size_px.y();
+    const auto next = std::lower_bound(times_s_.begin(), times_s_.end(), t);
+    if (next == times_s_.begin() || next == times_s_.end()) return;
+    const Eigen::Index i = next - times_s_.begin();
+    const double u = (t - *(next - 1)) / (*next - *(next - 1));
+    const Eigen::Vector2d angle = (1.0 - u) * angle_.col(i - 1) + u * angle_.col(i);
+    columns(kCx, 0) = angle.y();
+    columns(kCy, 0) = -angle.x();
+  }
+
+ private:
+  const std::vector<double> times_s_;
+  const double delay_s_, readout_s_;
+  Eigen::Matrix2Xd angle_;
+};
+
+}  // namespace
+
+// Shapes: the corner frequency in Hz.
+EffectEntry OpticalStabilisationEntry() {
+  EffectEntry entry = {"optical_stabilisation",
+                       ModelPart::kLens,
+                       "the lens moves against fast rotation, so that the picture turns less "
+                       "than the camera",
+                       "switch the optical stabilisation off; else the principal point is a "
+                       "function of time, and only slow rotation shows the focal length",
+                       {},
+                       {}};
+  entry.shapes = [](const EffectSetup& setup) {
+    return setup.has_pixels ? std::vector<std::string>{"0.15", "0.5", "1"}
+                            : std::vector<std::string>{};
+  };
+  entry.make = [](const EffectSetup& setup,
+                  const std::string& shape) -> std::shared_ptr<const Effect> {
+    char* end = nullptr;
+    const double corner_hz = std::strtod(shape.c_str(), &end);
+    if (!setup.has_pixels || shape.empty() || *end != 0 || !(corner_hz > 0.0)) return nullptr;
+    return std::make_shared<OpticalStabilisation>(setup, corner_hz);
+  };
+  return entry;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,29 @@
+// A path that bends within a pair of frames: shaky hands and near points.
+#include "core/effects/entries.h"
+#include "core/effects/shapes.h"
+
+namespace camgyro {
+namespace {
+
+// Every pair has a turn of its direction already, with a narrow prior
+// (factors/coplanarity_plane.h); the effect widens it. No parameters of its own.
+class TranslationAcceleration final : public Effect {
+ public:
+  explicit TranslationAcceleration(const EffectSetup&) : Effect({}) {}
+  double turn_sigma_rad() const override { return 0.6; }
+};
+
+}  // namespace
+
+EffectEntry TranslationAccelerationEntry() {
+  return WithOneShape<TranslationAcceleration>(
+      {"translation_acceleration",
+       ModelPart::kBaseline,
+       "the camera's path bends strongly within a pair of frames: shaky hands and near points",
+       "hold the camera more calmly, or look at things further away",
+       {},
+       {}},
+      "turn", NeedsPixels);
+}
+
+}  // namespace camgyro

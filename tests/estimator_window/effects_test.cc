@@ -1,0 +1,137 @@
+// Every effect of core/effects against the simulator, which models it on its own: noise-free
+// pixels fit with the effect at its true size, and do not fit without.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/so3.h"
+#include "estimator/window/direction_search.h"
+#include "estimator/window/pair_view.h"
+#include "factors/coplanarity_plane.h"
+#include "tools/simulation/simulate.h"
+
+namespace camgyro {
+namespace {
+
+struct Case {
+  std::string name;       // as for --effects
+  std::string overrides;  // of the scenario, separated by |
+  std::vector<double> values;
+  double gain = 10.0;      // the effect lowers the residual by more than this
+  double delay_s = 0.015;  // that fits, where the effect has a part in it
+};
+
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+
+class EffectAgainstSimulator : public testing::TestWithParam<Case> {};
+
+// Rms of the plane residuals in pixels, with the direction and its turn that fit each pair best.
+double Rms(const EstimationInput& input, const Calibration& calibration) {
+  PairGraphOptions options;
+  options.robust_threshold = 0.0;
+  options.gyro_sigma_rad_s.setConstant(1e-3);
+  double sum_sq = 0.0;
+  int count = 0;
+  PairView view;
+  for (size_t i = 0; i < input.pairs.size(); i += 7) {
+    EXPECT_TRUE(ViewPair(input, input.pairs[i], calibration, 0.05, options, &view));
+    const DirectionEstimate found = FindDirection(view.bearings, 0.0025, 0.0025, 0.0);
+    // The turn: one linear step.
+    const PairMeasurement& m = view.measurement;
+    Eigen::MatrixXd J(m.matches.size(), 6);
+    Eigen::VectorXd r(m.matches.size());
+    for (size_t k = 0; k < m.matches.size(); ++k) {
+      const Bearing &a = view.bearings.a[k], &b = view.bearings.b[k];
+      const PlaneResidual residual = EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref,
+                                                           b.J_ray_px, found.tau, 0.0025, 0.0025);
+      const auto row = static_cast<Eigen::Index>(k);
+      r[row] = residual.value;
+      J.row(row) << residual.by_tau.transpose(),
+          CoplanarityPlane::RowShare(m, m.matches[k]) * residual.by_tau.transpose();
+    }
+    r -= J * J.completeOrthogonalDecomposition().solve(r);
+    sum_sq += 0.0025 * r.squaredNorm();
+    count += static_cast<int>(r.size());
+  }
+  return std::sqrt(sum_sq / count);
+}
+
+TEST_P(EffectAgainstSimulator, FitsItsPixels) {
+  const Case& test = GetParam();
+  std::vector<std::string> overrides = {"duration_s=9",
+                                        "seed=4",
+                                        "tracks.noise_px=0",
+                                        "gyro.rate_hz=400",
+                                        "gyro.noise_density_rad_s_rtHz=0",
+                                        "motion.kind=walking",
+                                        "gyro.bias_walk_rad_s2_rtHz=0"};
+  for (size_t begin = 0; begin < test.overrides.size();) {
+    const size_t end = std::min(test.overrides.find('|', begin), test.overrides.size());
+    overrides.push_back(test.overrides.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  const auto scenario = simulation::ParseScenario("", overrides);
+  ASSERT_TRUE(scenario) << scenario.error().message;
+  const auto simulated = simulation::SimulateTracks(*scenario);
+  ASSERT_TRUE(simulated) << simulated.error().message;
+  const EstimationInput input = MakeEstimationInput(simulated->recording);
+  Calibration calibration = simulated->truth;
+  calibration.delay_s = test.delay_s;
+  calibration.lens = MakePinhole(650.0, {359.5, 239.5});
+  if (test.name == "readout_direction") calibration.readout_s = 0.0;
+  const double without = Rms(input, calibration);
+
+  const Result<EffectSet> effects =
+      MakeEffects(test.name, MakeEffectSetup(simulated->recording, calibration));
+  ASSERT_TRUE(effects) << effects.error().message;
+  calibration.effects = std::make_shared<const EffectSet>(*effects);
+  calibration.effect_values = Eigen::Map<const Eigen::VectorXd>(
+      test.values.data(), static_cast<Eigen::Index>(test.values.size()));
+  ASSERT_EQ(effects->size(), calibration.effect_values.size());
+  if (test.name == "bias_drift:linear") {  // the bias is then that of the middle
+    const double middle_s = 0.5 * (input.pairs.front().time_a_s + input.pairs.back().time_b_s);
+    calibration.bias_gyro_rad_s += (middle_s + test.delay_s) * calibration.effect_values;
+  }
+  const double with = Rms(input, calibration);
+  EXPECT_LT(with, without / test.gain) << "without " << without << " px, with " << with << " px";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Catalogue, EffectAgainstSimulator,
+    testing::Values(
+        Case{"radial_distortion", "effects.radial_distortion={k1: -0.14,k2: 0.03}", {-0.14, 0.03}},
+        Case{"tangential_distortion",
+             "effects.tangential_distortion={p1: 0.002,p2: -0.003}",
+             {0.002, -0.003}},
+        Case{"aspect_ratio", "effects.aspect_ratio={ratio: 1.012}", {0.012}},
+        Case{"focal_drift:linear", "effects.focal_drift={rate_px_s: 2}", {2.0}},
+        Case{"optical_stabilisation:0.5",
+             "effects.optical_stabilisation={gain: 0.4,corner_hz: 0.5}",
+             {0.4 * 650.0}},
+        Case{"clock_skew", "effects.clock_skew={ppm: 400}", {400.0}},
+        Case{"delay_step:5", "effects.delay_step={time_s: 5.0,step_s: 0.01}", {0.01}},
+        Case{"readout_direction", "effects.readout_direction={columns: true}", {0.02}, 8.0},
+        Case{"readout_nonlinear", "effects.readout_nonlinear={curve: 0.06}", {0.06 * 0.02}},
+        Case{"gyro_scale", "effects.gyro_scale={error: [0.015,-0.01,0.02]}", {0.015, -0.01, 0.02}},
+        Case{"gyro_misalignment",
+             "effects.gyro_misalignment={xy: 0.01,xz: -0.008,yz: 0.006}",
+             {0.01, -0.008, 0.006}},
+        // The time constant is in the delay; third order is neglected.
+        Case{"gyro_lowpass", "effects.gyro_lowpass={time_constant_s: 0.008}", {6.4e-5}, 4.0, 0.023},
+        Case{"bias_drift:linear",
+             "effects.bias_drift={rate_rad_s2: [0.005,-0.003,0.002]}",
+             {0.005, -0.003, 0.002}},
+        Case{"exposure_delay",
+             "effects.exposure_delay={factor: 0.5}|camera.exposure_s=0.012|"
+             "camera.exposure_swing=0.8",
+             {0.5}}),
+    [](const auto& tested) {
+      std::string name = tested.param.name;
+      for (char& c : name) {
+        if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+      }
+      return name;
+    });
+
+}  // namespace
+}  // namespace camgyro
