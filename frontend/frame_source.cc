@@ -1,5 +1,7 @@
 #include "frontend/frame_source.h"
 
+#include <cstring>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "frontend/readers/ffmpeg.h"
@@ -13,18 +15,25 @@ namespace {
 
 class ImageFrames : public FrameSource {
  public:
-  explicit ImageFrames(const Recording& recording) : recording_(recording) {}
+  ImageFrames(const Recording& recording, PictureFormat format)
+      : recording_(recording), format_(format) {}
 
-  Result<bool> Next(cv::Mat* gray) override {
+  Result<bool> Next(cv::Mat* picture) override {
     if (next_ == recording_.frames.size()) return false;
     const std::string& file = recording_.frames[next_].image_file;
-    Result<cv::Mat> image = ReadGrayImage(file);
+    const bool gray = format_ == PictureFormat::kGray;
+    Result<cv::Mat> image = gray ? ReadGrayImage(file) : ReadColourImage(file);
     if (!image) return tl::unexpected(image.error());
-    *gray = std::move(*image);
-    if (gray->cols != recording_.camera.width_px || gray->rows != recording_.camera.height_px) {
-      return BadInput(Concat(file, ": has ", gray->cols, " x ", gray->rows, " pixels, expected ",
+    if (image->cols != recording_.camera.width_px || image->rows != recording_.camera.height_px) {
+      return BadInput(Concat(file, ": has ", image->cols, " x ", image->rows, " pixels, expected ",
                              recording_.camera.width_px, " x ", recording_.camera.height_px,
                              " as the frames before it"));
+    }
+    if (gray) {
+      *picture = std::move(*image);
+    } else {
+      const cv::Rect even(0, 0, image->cols & ~1, image->rows & ~1);
+      cv::cvtColor((*image)(even), *picture, cv::COLOR_BGR2YUV_I420);
     }
     ++next_;
     return true;
@@ -32,13 +41,17 @@ class ImageFrames : public FrameSource {
 
  private:
   const Recording& recording_;
+  const PictureFormat format_;
   size_t next_ = 0;
 };
 
 class VideoFrames : public FrameSource {
  public:
-  explicit VideoFrames(const Recording& recording)
-      : recording_(recording), packet_(av_packet_alloc()), frame_(av_frame_alloc()) {}
+  VideoFrames(const Recording& recording, PictureFormat picture_format)
+      : recording_(recording),
+        picture_format_(picture_format),
+        packet_(av_packet_alloc()),
+        frame_(av_frame_alloc()) {}
 
   Status Open() {
     auto format = OpenContainer(File());
@@ -58,7 +71,7 @@ class VideoFrames : public FrameSource {
     return {};
   }
 
-  Result<bool> Next(cv::Mat* gray) override {
+  Result<bool> Next(cv::Mat* picture) override {
     const Result<bool> decoded = Decode();
     if (!decoded) return decoded;
     const size_t expected = recording_.frames.size();
@@ -80,7 +93,9 @@ class VideoFrames : public FrameSource {
                              frame_->height, " pixels, expected ", recording_.camera.width_px,
                              " x ", recording_.camera.height_px));
     }
-    ToGray(gray);
+    if (Status converted = Convert(picture); !converted) {
+      return tl::unexpected(converted.error());
+    }
     av_frame_unref(frame_.get());
     ++next_;
     return true;
@@ -115,6 +130,42 @@ class VideoFrames : public FrameSource {
     return code == AVERROR_EOF ? avcodec_send_packet(codec_.get(), nullptr) : code;
   }
 
+  Status Convert(cv::Mat* picture) {
+    if (picture_format_ == PictureFormat::kGray) {
+      ToGray(picture);
+      return {};
+    }
+    const auto from = static_cast<AVPixelFormat>(frame_->format);
+    const AVFrame* i420 = frame_.get();
+    // The J format is the same with a full range of values, which stays as it is.
+    if (from != AV_PIX_FMT_YUV420P && from != AV_PIX_FMT_YUVJ420P) {
+      // Into a frame of FFmpeg's, whose rows have the padding that swscale may write to.
+      converted_.reset(av_frame_alloc());
+      converted_->format = AV_PIX_FMT_YUV420P;
+      converted_->width = frame_->width;
+      converted_->height = frame_->height;
+      const int code = av_frame_get_buffer(converted_.get(), 0);
+      if (code < 0) return BadInput(Concat(File(), ": ", FfmpegError(code)));
+      to_i420_.reset(sws_getCachedContext(to_i420_.release(), frame_->width, frame_->height, from,
+                                          frame_->width, frame_->height, AV_PIX_FMT_YUV420P,
+                                          SWS_BILINEAR, nullptr, nullptr, nullptr));
+      sws_scale(to_i420_.get(), frame_->data, frame_->linesize, 0, frame_->height, converted_->data,
+                converted_->linesize);
+      i420 = converted_.get();
+    }
+    const int width = frame_->width & ~1, height = frame_->height & ~1;
+    picture->create(height + height / 2, width, CV_8UC1);
+    uint8_t* to = picture->data;
+    for (int plane = 0; plane < 3; ++plane) {
+      const int rows = plane == 0 ? height : height / 2, columns = plane == 0 ? width : width / 2;
+      for (int row = 0; row < rows; ++row, to += columns) {
+        std::memcpy(to, i420->data[plane] + static_cast<ptrdiff_t>(row) * i420->linesize[plane],
+                    static_cast<size_t>(columns));
+      }
+    }
+    return {};
+  }
+
   void ToGray(cv::Mat* gray) {
     gray->create(frame_->height, frame_->width, CV_8UC1);
     to_gray_.reset(sws_getCachedContext(to_gray_.release(), frame_->width, frame_->height,
@@ -127,24 +178,28 @@ class VideoFrames : public FrameSource {
   }
 
   const Recording& recording_;
+  const PictureFormat picture_format_;
   FfmpegPtr<AVFormatContext> format_;
   FfmpegPtr<AVCodecContext> codec_;
-  FfmpegPtr<SwsContext> to_gray_;
+  FfmpegPtr<SwsContext> to_gray_, to_i420_;
   FfmpegPtr<AVPacket> packet_;
-  FfmpegPtr<AVFrame> frame_;
+  FfmpegPtr<AVFrame> frame_, converted_;
   int stream_ = -1;
   size_t next_ = 0;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<FrameSource>> OpenFrames(const Recording& recording) {
+Result<std::unique_ptr<FrameSource>> OpenFrames(const Recording& recording, PictureFormat format) {
   if (!recording.HasImages()) {
     return BadInput(Concat(recording.path, ": has no pictures, expected images or a video"));
   }
-  if (recording.video_file.empty()) return std::make_unique<ImageFrames>(recording);
-  if (IsRosbag(recording.video_file)) return OpenRosbagFrames(recording);
-  auto frames = std::make_unique<VideoFrames>(recording);
+  if (recording.video_file.empty()) return std::make_unique<ImageFrames>(recording, format);
+  if (IsRosbag(recording.video_file)) {
+    if (format == PictureFormat::kGray) return OpenRosbagFrames(recording);
+    return BadInput(Concat(recording.path, ": pictures of a bag are read in grey only"));
+  }
+  auto frames = std::make_unique<VideoFrames>(recording, format);
   if (Status status = frames->Open(); !status) return tl::unexpected(status.error());
   return frames;
 }

@@ -8,12 +8,14 @@
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "tools/commands.h"
 #include "tools/recording_input.h"
+#include "tools/report/calibrate_report.h"
 #include "tools/result_files.h"
 #include "tools/summary.h"
 
 DEFINE_string(out, "",
               "folder to write into, made if absent; without: ./calibration (calibrate), the "
-              "recording (track), no files (delay, compare)");
+              "recording (track), no files (delay, compare); stabilize: the video, .mp4, .mov or "
+              ".mkv");
 DEFINE_string(estimator, "window",
               "online estimator: window, or ekf, the filter of the paper, without refinement");
 DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");
@@ -81,7 +83,15 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   const bool attitudes = HasOnlyAttitudes(*recording);
   files.Add("trace.csv", TraceCsv(report->trace));
   files.Add("delay.csv", DelayCsv(report->start.curve));
-  files.Add("calibration.yaml", CalibrationYaml(*report, attitudes));
+  const std::string yaml = CalibrationYaml(*report, attitudes);
+  files.Add("calibration.yaml", yaml);
+  const Command command = CalibrateCommand();
+  const Result<std::string> html =
+      CalibrationReportHtml(*recording, *report,
+                            {CommandLineOf(command, arguments), DescribeRecording(*recording),
+                             FlagValues(command), yaml});
+  if (!html) return tl::unexpected(html.error());
+  files.Add("report.html", *html);
   if (Status written = files.Write(); !written) return written;
 
   std::printf("\n%s", ParameterTable(report->calibration, attitudes).c_str());
@@ -90,7 +100,8 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
                 StartLine(report->start).c_str(), QualityLine(*report, attitudes).c_str(),
                 TimeLine(*report, tracking->seconds, recording->frames.size()).c_str(),
                 Notes("note", report->notes).c_str(), Notes("doubt", report->doubts).c_str());
-    std::printf("written    %s/calibration.yaml, trace.csv, delay.csv\n", files.folder().c_str());
+    std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv\n",
+                files.folder().c_str());
   }
   return {};
 }

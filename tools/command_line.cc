@@ -74,6 +74,32 @@ std::string NearestName(const std::string& name, const std::vector<std::string>&
   return nearest;
 }
 
+std::string CommandLineOf(const Command& command, const std::vector<std::string>& arguments) {
+  std::string line = "camgyro " + command.name;
+  const auto add = [&](const std::string& word) {
+    // As a shell wants it.
+    const bool plain = word.find_first_of(" \t\n'\"\\$&|;<>()*?[]#~`!{}") == std::string::npos;
+    std::string quoted = word;
+    for (size_t i = 0; (i = quoted.find('\'', i)) != std::string::npos; i += 4) {
+      quoted.replace(i, 1, "'\\''");
+    }
+    line += plain ? " " + word : " '" + quoted + "'";
+  };
+  for (const std::string& argument : arguments) add(argument);
+  for (const auto& [name, value] : FlagValues(command)) {
+    if (FlagGiven(name.c_str())) add("--" + name + "=" + value);
+  }
+  return line;
+}
+
+std::vector<std::pair<std::string, std::string>> FlagValues(const Command& command) {
+  std::vector<std::pair<std::string, std::string>> values;
+  for (const std::string& name : command.flags) {
+    values.emplace_back(name, gflags::GetCommandLineFlagInfoOrDie(name.c_str()).current_value);
+  }
+  return values;
+}
+
 Result<ParsedCommandLine> ParseCommandLine(const Command& command,
                                            const std::vector<std::string>& words) {
   ParsedCommandLine parsed;

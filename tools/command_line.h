@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/result.h"
@@ -36,6 +37,11 @@ std::string CommandHelp(const Command& command);
 
 // True if the user gave this flag.
 bool FlagGiven(const char* name);
+
+// How the user called this command, with the flags that were given; and all of its flags with their
+// values.
+std::string CommandLineOf(const Command& command, const std::vector<std::string>& arguments);
+std::vector<std::pair<std::string, std::string>> FlagValues(const Command& command);
 
 // The known name that `name` was probably meant to be, or nothing.
 std::string NearestName(const std::string& name, const std::vector<std::string>& known);

@@ -16,6 +16,7 @@ Command DelayCommand();
 Command TrackCommand();
 Command SimulateCommand();
 Command ExportCommand();
+Command StabilizeCommand();
 Command HelpCommand();
 
 // All of them, in the order of the help.

@@ -18,6 +18,7 @@ std::vector<Command> AllCommands() {
       SimulateCommand(),   //
       CompareCommand(),    //
       ExportCommand(),     //
+      StabilizeCommand(),  //
       HelpCommand(),
   };
 }

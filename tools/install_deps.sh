@@ -1,6 +1,7 @@
 #!/bin/bash
-# Installs what camgyro needs to build, test and run on Debian 12: only packages that are missing,
-# and without apt-get if none is. Needs root or sudo for that.
+# tools/install_deps.sh [PACKAGE...]: installs what camgyro needs to build, test and run on Debian
+# 12, and the packages named: only those that are missing, and without apt-get if none is. Needs
+# root or sudo for that.
 set -euo pipefail
 
 packages=(
@@ -14,6 +15,8 @@ packages=(
   libprotobuf-dev protobuf-compiler
   # Python module
   pybind11-dev python3-dev python3-numpy
+  # charts of report.html
+  libjs-dygraphs
   # tests
   libgmock-dev libgtest-dev libbenchmark-dev
   # tools/measure*.py
@@ -21,7 +24,7 @@ packages=(
 )
 
 missing=()
-for package in "${packages[@]}"; do
+for package in "${packages[@]}" "$@"; do
   status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
   [[ $status == installed ]] || missing+=("$package")
 done

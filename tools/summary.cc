@@ -7,13 +7,12 @@
 #include <sstream>
 #include <vector>
 
-#include "core/so3.h"
 #include "estimator/start/axis_permutation.h"
+#include "tools/report/parameter_rows.h"
 
 namespace camgyro {
 namespace {
 
-constexpr double kDegrees = 57.29577951308232;
 constexpr size_t kWidth = 96;
 
 __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
@@ -25,30 +24,12 @@ __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...
   return text;
 }
 
-struct Row {
-  const char* name;
-  int index;  // in the state
-  double value;
-  double unit_scale;  // shown = value * unit_scale
-  const char* unit;
-  bool needs_pixels;
-};
-
-// Two digits of the sigma.
-int Decimals(double sigma) {
-  return sigma > 0.0 ? std::min(6, std::max(0, 1 - static_cast<int>(std::floor(std::log10(sigma)))))
-                     : 6;
-}
-
-std::string TableRow(const Row& row, const Calibration& c, bool attitudes) {
-  const double sigma = row.unit_scale * c.sigma()[row.index];
-  if (attitudes && row.needs_pixels) return "";
-  const int decimals = Decimals(sigma);
-  const bool determined = c.determined[static_cast<size_t>(row.index)];
-  return Format("  %-22s %12.*f ± %-9.*f ", row.name, decimals, row.unit_scale * row.value,
-                decimals, sigma) +
-         (determined ? std::string(row.unit)
-                     : Format("%-6s not determined by this recording", row.unit)) +
+std::string TableRow(const ParameterRow& row) {
+  const int decimals = DecimalsFor(row.sigma);
+  return Format("  %-22s %12.*f ± %-9.*f ", row.name.c_str(), decimals, row.value, decimals,
+                row.sigma) +
+         (row.determined ? row.unit
+                         : Format("%-6s not determined by this recording", row.unit.c_str())) +
          "\n";
 }
 
@@ -69,8 +50,8 @@ std::string EffectRows(const Calibration& c) {
       const int column = item.first + k;
       const double scale = seconds ? 1e3 : 1.0;
       const double sigma = scale * std::sqrt(c.effect_covariance(column, column));
-      rows += Format("    %-20s %12.*f ± %-9.*f %s\n", p.name.c_str(), Decimals(sigma),
-                     scale * c.effect_values[column], Decimals(sigma), sigma,
+      rows += Format("    %-20s %12.*f ± %-9.*f %s\n", p.name.c_str(), DecimalsFor(sigma),
+                     scale * c.effect_values[column], DecimalsFor(sigma), sigma,
                      seconds ? "ms" : p.unit.c_str());
     }
   }
@@ -80,28 +61,13 @@ std::string EffectRows(const Calibration& c) {
 }  // namespace
 
 std::string ParameterTable(const Calibration& c, bool attitudes) {
-  const NearestPermutation nearest = FindNearestPermutation(c.q_gyro_cam.toRotationMatrix());
-  const Eigen::Quaterniond q_permutation(nearest.P_gyro_cam);
-  const Eigen::Vector3d turn = Log<double>(q_permutation.conjugate() * c.q_gyro_cam);
-  const Eigen::Vector3d& bias = c.bias_gyro_rad_s;
-  const std::vector<Row> rows = {
-      {"focal length", kStateFocal, c.lens[kFocal], 1.0, "px", true},
-      {"principal point x", kStateCx, c.lens[kCx], 1.0, "px", true},
-      {"principal point y", kStateCy, c.lens[kCy], 1.0, "px", true},
-      {"readout time", kStateReadout, c.readout_s, 1e3, "ms", true},
-      {attitudes ? "delay" : "delay of row 0", kStateDelay, c.delay_s, 1e3, "ms", false},
-      {"gyro bias x", kStateBias, bias.x(), kDegrees, "deg/s", false},
-      {"gyro bias y", kStateBias + 1, bias.y(), kDegrees, "deg/s", false},
-      {"gyro bias z", kStateBias + 2, bias.z(), kDegrees, "deg/s", false},
-      {"mounting, about x", kStateRotation, turn.x(), kDegrees, "deg", false},
-      {"mounting, about y", kStateRotation + 1, turn.y(), kDegrees, "deg", false},
-      {"mounting, about z", kStateRotation + 2, turn.z(), kDegrees, "deg", false}};
+  const Eigen::Matrix3d permutation = MountingPermutation(c);
   std::string table;
-  for (const Row& row : rows) table += TableRow(row, c, attitudes);
+  for (const ParameterRow& row : ParameterRows(c, permutation, attitudes)) table += TableRow(row);
   return table + EffectRows(c) +
          "  (t_gyro = t_camera + delay; the mounting is what is left, about the camera's\n"
          "  axes, after " +
-         DescribePermutation(nearest.P_gyro_cam) + ")\n";
+         DescribePermutation(permutation) + ")\n";
 }
 
 std::string MotionLine(const Recording& recording, const TrackingSummary& tracking) {

@@ -15,9 +15,10 @@
 
 DECLARE_string(out);
 DECLARE_bool(quiet);
-DEFINE_string(calibration, "",
-              "calibration.yaml of this camera and gyro: the gyro then predicts where corners go, "
-              "and wrong is what is off its epipolar line");
+DEFINE_string(
+    calibration, "",
+    "calibration.yaml of this camera and gyro (track: the gyro then predicts where corners "
+    "go, and wrong is what is off its epipolar line)");
 DEFINE_int32(max_points, 200, "corners followed per frame");
 
 namespace camgyro {

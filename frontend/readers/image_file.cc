@@ -37,9 +37,7 @@ bool JpegIsWhole(const std::vector<uint8_t>& bytes) {
   return false;
 }
 
-}  // namespace
-
-Result<cv::Mat> ReadGrayImage(const std::string& file) {
+Result<cv::Mat> ReadImage(const std::string& file, int flags) {
   std::ifstream in(file, std::ios::binary);
   const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(in)),
                                    std::istreambuf_iterator<char>());
@@ -48,12 +46,22 @@ Result<cv::Mat> ReadGrayImage(const std::string& file) {
     return BadInput(Concat(file, ": the JPEG is cut short, expected a whole image"));
   }
   try {
-    cv::Mat gray = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-    if (!gray.empty()) return gray;
+    cv::Mat image = cv::imdecode(bytes, flags | cv::IMREAD_IGNORE_ORIENTATION);
+    if (!image.empty()) return image;
   } catch (const cv::Exception&) {
     // Answered like an empty picture; OpenCV's text names its own source lines.
   }
   return BadInput(Concat(file, ": cannot be decoded, expected a whole image"));
+}
+
+}  // namespace
+
+Result<cv::Mat> ReadGrayImage(const std::string& file) {
+  return ReadImage(file, cv::IMREAD_GRAYSCALE);
+}
+
+Result<cv::Mat> ReadColourImage(const std::string& file) {
+  return ReadImage(file, cv::IMREAD_COLOR);
 }
 
 }  // namespace camgyro

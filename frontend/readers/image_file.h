@@ -1,4 +1,4 @@
-// One image of a recording as grey values.
+// One image of a recording.
 #ifndef CAMGYRO_FRONTEND_READERS_IMAGE_FILE_H_
 #define CAMGYRO_FRONTEND_READERS_IMAGE_FILE_H_
 
@@ -13,6 +13,8 @@ namespace camgyro {
 // An image that cannot be decoded, or is cut short, is an error. OpenCV alone fills up the missing
 // part of a half-written JPEG with grey and reports success.
 Result<cv::Mat> ReadGrayImage(const std::string& file);
+// The same with three channels, blue first; grey images have three equal ones.
+Result<cv::Mat> ReadColourImage(const std::string& file);
 
 }  // namespace camgyro
 

@@ -229,6 +229,25 @@ TEST(FolderReader, HandsOutImagesInOrder) {
   EXPECT_FALSE((*frames)->Next(&gray).value());  // and stays at the end
 }
 
+TEST(FolderReader, ImagesHaveColourPlanes) {
+  const RecordingFolder folder;
+  WriteImageRecording(folder, ".png");
+  // Pure blue: Y, U, V of BT.601 video are 41, 240, 110.
+  cv::imwrite(folder.File("cam0/data/1.png"), cv::Mat(48, 64, CV_8UC3, cv::Scalar(255, 0, 0)));
+  const Result<Recording> recording = ReadRecording(folder.path());
+  ASSERT_TRUE(recording) << recording.error().message;
+  auto frames = OpenFrames(*recording, PictureFormat::kI420);
+  ASSERT_TRUE(frames) << frames.error().message;
+  cv::Mat i420;
+  ASSERT_TRUE((*frames)->Next(&i420).value());
+  ASSERT_EQ(i420.size(), cv::Size(64, 72));
+  EXPECT_LE(cv::norm(i420.rowRange(48, 72) - 128, cv::NORM_INF), 1.0);  // grey
+  ASSERT_TRUE((*frames)->Next(&i420).value());
+  EXPECT_NEAR(i420.at<uint8_t>(20, 30), 41, 1);
+  EXPECT_NEAR(i420.at<uint8_t>(48 + 3, 30), 240, 1);
+  EXPECT_NEAR(i420.at<uint8_t>(60 + 3, 30), 110, 1);
+}
+
 TEST(FolderReader, NamesAnImageThatIsCutShort) {
   for (const std::string extension : {".png", ".jpg"}) {
     SCOPED_TRACE(extension);

@@ -39,6 +39,25 @@ void WriteFolder(const RecordingFolder& folder, const VideoSpec& spec) {
   ASSERT_TRUE(WriteVideo(folder.File("cam0/video.mp4"), spec));
 }
 
+TEST(VideoReader, HandsOutColourPlanes) {
+  const RecordingFolder folder;
+  WriteFolder(folder, Video(3));
+  const Result<Recording> recording = ReadRecording(folder.path());
+  ASSERT_TRUE(recording) << recording.error().message;
+  auto frames = OpenFrames(*recording, PictureFormat::kI420);
+  ASSERT_TRUE(frames) << frames.error().message;
+  cv::Mat i420;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE((*frames)->Next(&i420).value_or(false));
+    ASSERT_EQ(i420.size(), cv::Size(64, 72));
+    cv::Mat luma;  // as WriteVideo scales it
+    Picture(i).convertTo(luma, CV_8UC1, 219.0 / 255.0, 16.0);
+    EXPECT_LT(cv::norm(i420.rowRange(0, 48), luma, cv::NORM_L1) / (64.0 * 48.0), 3.0) << i;
+    EXPECT_LT(cv::norm(i420.rowRange(48, 72) - 128, cv::NORM_INF), 3.0) << i;  // no colour
+  }
+  EXPECT_FALSE((*frames)->Next(&i420).value());
+}
+
 // Number of frames that were handed out whole; the last answer in `end`.
 int CountFrames(const Recording& recording, Result<bool>* end) {
   auto frames = OpenFrames(recording);

@@ -79,7 +79,7 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
               ReadFile(Path(std::string("result/") + name)))
         << name;
   }
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(Path("again")), {}), 3);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(Path("again")), {}), 4);
   EXPECT_LT(again.out.size(), run.out.size());
 }
 

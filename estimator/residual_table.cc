@@ -1,0 +1,51 @@
+#include "estimator/residual_table.h"
+
+#include <cmath>
+
+#include "estimator/window/direction_search.h"
+#include "estimator/window/pair_view.h"
+#include "factors/coplanarity_plane.h"
+
+namespace camgyro {
+
+std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
+                                            const std::vector<TimedPair>& pairs,
+                                            const Calibration& calibration, double noise_px,
+                                            const PairGraphOptions& options) {
+  std::vector<MatchResidual> residuals;
+  const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);
+  PairView view;
+  for (const TimedPair& pair : pairs) {
+    if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
+    const PairBearings& bearings = view.bearings;
+    if (bearings.a.size() < PairGraph::kMinMatches) continue;
+    const double variance_a = view.measurement.variance_a();
+    const double variance_b = view.measurement.variance_b();
+    const Eigen::Vector3d tau =
+        FindDirection(bearings, variance_a, variance_b, options.robust_threshold).tau;
+    for (size_t i = 0; i < bearings.a.size(); ++i) {
+      const Bearing &a = bearings.a[i], &b = bearings.b[i];
+      MatchResidual row;
+      row.frame_a = pair.frame_a;
+      row.frame_b = pair.frame_b;
+      row.match = view.measurement.matches[i];
+      row.time_s = RowTimeGyroS(pair.time_b_s, shutter, row.match.px_b.y(), calibration.height_px);
+      row.rate_rad_s = b.omega_cam_rad_s.norm();
+      const double sigmas = EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau,
+                                                  variance_a, variance_b)
+                                .value;
+      row.residual_px = sigmas * noise_px;
+      row.inlier = std::abs(sigmas) <= options.robust_threshold;
+      // tau . (a x b) = (tau x a) . b moves with px_b as this gradient says.
+      const Eigen::Vector2d gradient = b.J_ray_px.transpose() * tau.cross(a.ray_ref);
+      if (gradient.squaredNorm() > 0.0) {
+        row.correction_px =
+            -tau.dot(a.ray_ref.cross(b.ray_ref)) / gradient.squaredNorm() * gradient;
+      }
+      residuals.push_back(row);
+    }
+  }
+  return residuals;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,68 @@
+#include "tools/report/calibrate_report.h"
+
+#include "estimator/residual_table.h"
+#include "tools/report/recording_sections.h"
+#include "tools/report/residual_sections.h"
+
+namespace camgyro {
+namespace {
+
+constexpr size_t kMaxResidualPairs = 600;  // for the maps; spread over longer recordings
+
+// The calibration that the fit started from: what the files declare and the delay search found.
+Calibration StartOf(const Recording& recording, const StartResult& start) {
+  Calibration calibration = MakePrior(recording, start);
+  calibration.bias_gyro_rad_s = start.bias_gyro_rad_s;
+  return calibration;
+}
+
+std::vector<TimedPair> Spread(std::vector<TimedPair> pairs) {
+  if (pairs.size() <= kMaxResidualPairs) return pairs;
+  std::vector<TimedPair> some;
+  for (size_t i = 0; i < kMaxResidualPairs; ++i) {
+    some.push_back(std::move(pairs[i * pairs.size() / kMaxResidualPairs]));
+  }
+  return some;
+}
+
+}  // namespace
+
+Result<std::vector<ReportSection>> CalibrationSections(const Recording& recording,
+                                                       const CalibrationReport& report,
+                                                       const RunInfo& run) {
+  const bool attitudes = recording.matches.empty() && recording.tracks.empty();
+  const Calibration& calibration = report.calibration;
+  std::vector<ReportSection> sections = {
+      SummarySection(report, attitudes), MotionSection(recording, report, attitudes),
+      ConvergenceSection(report), DelaySection(report.start), RatesSection(recording, calibration)};
+  if (!attitudes) {
+    const EstimationInput input = MakeEstimationInput(recording);
+    const std::vector<TimedPair> pairs = Spread(input.pairs);
+    PairGraphOptions options;
+    options.match_noise = recording.match_noise;
+    const double noise_px = report.quality.noise_px;
+    const std::vector<TitledResiduals> fits = {
+        {"at the start",
+         ComputeResiduals(input, pairs, StartOf(recording, report.start), noise_px, options)},
+        {"calibrated", ComputeResiduals(input, pairs, calibration, noise_px, options)}};
+    sections.push_back(ResidualSection("residuals", "What is left unexplained", fits,
+                                       calibration.width_px, calibration.height_px, noise_px));
+    Result<ReportSection> matches = MatchesSection(recording, fits.back().residuals);
+    if (!matches) return tl::unexpected(matches.error());
+    sections.push_back(FitSection(report, attitudes));
+    sections.push_back(std::move(*matches));
+  } else {
+    sections.push_back(FitSection(report, attitudes));
+  }
+  sections.push_back(ReproductionSection(run));
+  return sections;
+}
+
+Result<std::string> CalibrationReportHtml(const Recording& recording,
+                                          const CalibrationReport& report, const RunInfo& run) {
+  const Result<std::vector<ReportSection>> sections = CalibrationSections(recording, report, run);
+  if (!sections) return tl::unexpected(sections.error());
+  return ReportPage("Calibration of " + recording.path, run.recording, *sections);
+}
+
+}  // namespace camgyro

@@ -1,0 +1,37 @@
+// The estimated parameters as people see them: one list for terminal and report.
+#ifndef CAMGYRO_TOOLS_REPORT_PARAMETER_ROWS_H_
+#define CAMGYRO_TOOLS_REPORT_PARAMETER_ROWS_H_
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/calibration.h"
+
+namespace camgyro {
+
+struct ParameterRow {
+  std::string name;
+  int index = 0;            // StateIndex
+  double value = 0.0;       // in `unit`
+  double sigma = 0.0;       // in `unit`
+  double unit_scale = 1.0;  // value in `unit` / value in the SI unit or px of the state
+  std::string unit;
+  bool determined = false;
+};
+
+// The signed permutation of axes nearest to the mounting, camera -> gyro.
+Eigen::Matrix3d MountingPermutation(const Calibration& calibration);
+
+// One row per parameter, in the order of StateIndex; with `attitudes` without those that need
+// pixels. Rotations are what is left of q_gyro_cam after `permutation`, as a rotation vector about
+// the camera's axes.
+std::vector<ParameterRow> ParameterRows(const Calibration& calibration,
+                                        const Eigen::Matrix3d& permutation, bool attitudes);
+
+// Digits after the point that show two digits of the sigma, 0..6.
+int DecimalsFor(double sigma);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_TOOLS_REPORT_PARAMETER_ROWS_H_

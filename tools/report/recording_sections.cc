@@ -1,0 +1,207 @@
+#include "tools/report/recording_sections.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/so3.h"
+#include "core/time.h"
+#include "estimator/window/estimation_input.h"
+#include "frontend/camera_rotations.h"
+#include "frontend/frame_source.h"
+#include "tools/report/charts.h"
+
+namespace camgyro {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kDegrees = 57.29577951308232;
+constexpr size_t kMaxGyroPoints = 12000;  // of a chart; beyond, every n-th sample
+constexpr size_t kMaxCameraPoints = 600;
+constexpr size_t kShownPairs = 4;
+constexpr int kMaxPictureWidth = 512;
+constexpr int kJpegQuality = 60;
+
+struct RatePoint {
+  double time_s = 0.0;  // gyro clock, from the first frame's exposure
+  Eigen::Vector3d gyro = Eigen::Vector3d::Constant(kNaN);    // camera frame [rad/s]
+  Eigen::Vector3d camera = Eigen::Vector3d::Constant(kNaN);  // the same
+};
+
+// Rotations between neighbouring frames from the camera alone.
+std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
+                                                  const Calibration& calibration) {
+  std::vector<CameraRotation> rotations;
+  std::vector<FramePair> pairs;
+  for (TimedPair& pair : MakeEstimationInput(recording).pairs) {
+    if (pair.matches.empty()) {
+      rotations.push_back(pair.rotation);
+    } else {
+      pairs.push_back({pair.frame_a, pair.frame_b, std::move(pair.matches)});
+    }
+  }
+  if (pairs.empty()) return rotations;
+  CameraGuess camera = recording.camera;
+  const LensParameters lens = calibration.FullLens();
+  camera.aspect_ratio = lens[kAspect];
+  camera.principal_px = Eigen::Vector2d(lens[kCx], lens[kCy]);
+  camera.distortion_model = DistortionModel::kRadTan;  // of which the others are cases
+  camera.distortion.assign(lens.data() + kK1, lens.data() + kLensSize);
+  return CameraRotationsOf(SpreadPairs(pairs, kMaxCameraPoints), camera, lens[kFocal]);
+}
+
+std::vector<RatePoint> RatePoints(const Recording& recording, const Calibration& calibration) {
+  // The middle row stands for its frame.
+  const double shift_s = calibration.delay_s + 0.5 * calibration.readout_s;
+  const int64_t first_ns = recording.frames.front().stamp_ns;
+  const double last_s = SecondsSince(first_ns, recording.frames.back().stamp_ns);
+  std::vector<RatePoint> points;
+  std::vector<const GyroSample*> samples;
+  for (const GyroSample& sample : recording.gyro) {
+    const double time_s = SecondsSince(first_ns, sample.stamp_ns) - shift_s;
+    if (time_s >= 0.0 && time_s <= last_s) samples.push_back(&sample);
+  }
+  const size_t step = samples.size() / kMaxGyroPoints + 1;
+  for (size_t i = 0; i < samples.size(); i += step) {
+    RatePoint point;
+    point.time_s = SecondsSince(first_ns, samples[i]->stamp_ns) - shift_s;
+    point.gyro = calibration.q_gyro_cam.conjugate() *
+                 (samples[i]->omega_gyro_rad_s - calibration.bias_gyro_rad_s);
+    points.push_back(point);
+  }
+  for (const CameraRotation& rotation : RotationsOfNeighbours(recording, calibration)) {
+    const auto stamp = [&](int frame) {
+      return SecondsSince(first_ns, recording.frames[static_cast<size_t>(frame)].stamp_ns);
+    };
+    const double a_s = stamp(rotation.frame_a), b_s = stamp(rotation.frame_b);
+    RatePoint point;
+    point.time_s = 0.5 * (a_s + b_s);
+    point.camera = Log<double>(rotation.q_a_b) / (b_s - a_s);
+    points.push_back(point);
+  }
+  std::sort(points.begin(), points.end(),
+            [](const RatePoint& a, const RatePoint& b) { return a.time_s < b.time_s; });
+  return points;
+}
+
+// Pictures of some frames (ascending indices), scaled down and as jpeg.
+Result<std::map<int, std::vector<unsigned char>>> Pictures(const Recording& recording,
+                                                           const std::vector<int>& frames) {
+  std::map<int, std::vector<unsigned char>> pictures;
+  if (!recording.HasImages() || frames.empty()) return pictures;
+  // Single images need not be read one after the other; a video does.
+  Recording shown;
+  shown.path = recording.path;
+  shown.camera = recording.camera;
+  shown.video_file = recording.video_file;
+  const bool video = !recording.video_file.empty();
+  for (const int frame : frames) {
+    if (!video) shown.frames.push_back(recording.frames[static_cast<size_t>(frame)]);
+  }
+  if (video) shown.frames = recording.frames;
+  Result<std::unique_ptr<FrameSource>> source = OpenFrames(shown);
+  if (!source) return tl::unexpected(source.error());
+  size_t next = 0;
+  for (int i = 0; next < frames.size(); ++i) {
+    cv::Mat gray;
+    const Result<bool> read = (*source)->Next(&gray);
+    if (!read) return tl::unexpected(read.error());
+    if (!*read) break;
+    if (video && i != frames[next]) continue;
+    const double scale = std::min(1.0, static_cast<double>(kMaxPictureWidth) / gray.cols);
+    cv::Mat small;
+    cv::resize(gray, small, cv::Size(), scale, scale, cv::INTER_AREA);
+    cv::imencode(".jpg", small, pictures[frames[next++]], {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  }
+  return pictures;
+}
+
+}  // namespace
+
+ReportSection RatesSection(const Recording& recording, const Calibration& calibration) {
+  const std::vector<RatePoint> points = RatePoints(recording, calibration);
+  constexpr std::array<const char*, 3> kAxes = {"About x: tilting", "About y: panning",
+                                                "About z: rolling"};
+  std::string html = Paragraph(
+      "On one clock and in one frame, the camera's. Drag over a stretch to zoom into all "
+      "three, double click to go back. The camera's rates come from neighbouring frames "
+      "alone; strong parallax scatters them.",
+      "note");
+  for (int axis = 0; axis < 3; ++axis) {
+    LineChart chart;
+    chart.id = std::string("rates-") + "xyz"[axis];
+    chart.title = kAxes[static_cast<size_t>(axis)];
+    chart.x_label = "time since the first frame [s]";
+    chart.y_label = "deg/s";
+    chart.group = "rates";
+    ChartSeries gyro{"gyro", {}, {}, false, false}, camera{"camera", {}, {}, true, false};
+    for (const RatePoint& point : points) {
+      chart.x.push_back(point.time_s);
+      gyro.y.push_back(kDegrees * point.gyro[axis]);
+      camera.y.push_back(kDegrees * point.camera[axis]);
+    }
+    chart.series = {gyro, camera};
+    html += LineChartHtml(chart);
+  }
+  return {"rates", "Gyro and camera, synchronised", html};
+}
+
+Result<ReportSection> MatchesSection(const Recording& recording,
+                                     const std::vector<MatchResidual>& residuals) {
+  ReportSection section{"matches", "Matched features", ""};
+  std::vector<std::pair<int, int>> pairs;  // begin of each pair's rows, and its second frame
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    if (pairs.empty() || pairs.back().second != residuals[i].frame_b) {
+      pairs.emplace_back(static_cast<int>(i), residuals[i].frame_b);
+    }
+  }
+  if (pairs.empty()) {
+    section.html = Paragraph("This recording has no matched features.");
+    return section;
+  }
+  std::vector<size_t> shown;
+  for (size_t k = 0; k < kShownPairs; ++k) {
+    const size_t index = (2 * k + 1) * pairs.size() / (2 * kShownPairs);
+    if (shown.empty() || shown.back() != index) shown.push_back(index);
+  }
+  std::vector<int> frames;
+  for (const size_t index : shown) frames.push_back(pairs[index].second);
+  Result<std::map<int, std::vector<unsigned char>>> pictures = Pictures(recording, frames);
+  if (!pictures) return tl::unexpected(pictures.error());
+  section.html =
+      Paragraph(
+          "Lines: from where a feature was in the frame before. Circles: inliers; crosses: "
+          "outliers, further off their epipolar line than noise explains.",
+          "note") +
+      "<div class=\"side-by-side pictures\">";
+  for (const size_t index : shown) {
+    const size_t begin = static_cast<size_t>(pairs[index].first);
+    std::vector<DrawnMatch> matches;
+    size_t outliers = 0;
+    for (size_t i = begin; i < residuals.size() && residuals[i].frame_b == pairs[index].second;
+         ++i) {
+      matches.push_back({residuals[i].match.px_a, residuals[i].match.px_b, residuals[i].inlier});
+      outliers += residuals[i].inlier ? 0 : 1;
+    }
+    const double time_s =
+        SecondsSince(recording.frames.front().stamp_ns,
+                     recording.frames[static_cast<size_t>(pairs[index].second)].stamp_ns);
+    section.html +=
+        "<div>" +
+        MatchesHtml(FormatText("matches-%d", pairs[index].second),
+                    FormatText("Frame %d, at %.2f s: %zu inliers, %zu outliers",
+                               pairs[index].second, time_s, matches.size() - outliers, outliers),
+                    recording.camera.width_px, recording.camera.height_px,
+                    (*pictures)[pairs[index].second], matches) +
+        "</div>";
+  }
+  section.html += "</div>\n";
+  return section;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,84 @@
+#include "tools/stabilization/camera_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/pair_model.h"
+#include "core/so3.h"
+#include "core/time.h"
+
+namespace camgyro {
+namespace {
+
+RotationChain MakeChain(const Recording& recording, const Calibration& calibration) {
+  std::vector<double> times;
+  Eigen::Matrix3Xd rates(3, static_cast<Eigen::Index>(recording.gyro.size()));
+  for (const GyroSample& sample : recording.gyro) {
+    rates.col(static_cast<Eigen::Index>(times.size())) =
+        sample.omega_gyro_rad_s - calibration.bias_gyro_rad_s;
+    times.push_back(SecondsSince(recording.gyro.front().stamp_ns, sample.stamp_ns));
+  }
+  return RotationChain(times, rates);
+}
+
+}  // namespace
+
+CameraPath::CameraPath(const Recording& recording, const Calibration& calibration)
+    : calibration_(calibration),
+      R_gyro_cam_(calibration.q_gyro_cam.toRotationMatrix()),
+      chain_(MakeChain(recording, calibration)) {
+  for (const Frame& frame : recording.frames) {
+    frame_times_s_.push_back(SecondsSince(recording.gyro.front().stamp_ns, frame.stamp_ns));
+  }
+  const int frames = static_cast<int>(frame_times_s_.size());
+  while (first_frame_ < frames && !Covers(first_frame_)) ++first_frame_;
+  last_frame_ = frames - 1;
+  while (last_frame_ >= first_frame_ && !Covers(last_frame_)) --last_frame_;
+}
+
+double CameraPath::RowTime(int frame, double row_px) const {
+  return RowTimeGyroS(frame_times_s_[static_cast<size_t>(frame)],
+                      {calibration_.delay_s, calibration_.readout_s}, row_px,
+                      calibration_.height_px);
+}
+
+Eigen::Matrix3d CameraPath::R_world_cam(double time_s) const {
+  return chain_.At(time_s).R_ref_gyro * R_gyro_cam_;
+}
+
+bool CameraPath::Covers(int frame) const {
+  const double a = RowTime(frame, 0.0), b = RowTime(frame, calibration_.height_px);
+  return std::min(a, b) >= chain_.times_s().front() && std::max(a, b) <= chain_.times_s().back();
+}
+
+std::vector<Eigen::Quaterniond> SmoothOrientations(const CameraPath& path, double middle_row_px,
+                                                   double smooth_s) {
+  std::vector<double> times;
+  std::vector<Eigen::Quaterniond> measured;
+  for (int frame = path.first_frame(); frame <= path.last_frame(); ++frame) {
+    times.push_back(path.RowTime(frame, middle_row_px));
+    measured.emplace_back(path.R_world_cam(times.back()));
+  }
+  if (!(smooth_s > 0.0)) return measured;
+  std::vector<Eigen::Quaterniond> smooth = measured;
+  const size_t count = measured.size();
+  // The mean is the orientation about which the weighted rotation vectors cancel; two steps towards
+  // it leave less than 1 mrad of half a turn.
+  for (int step = 0; step < 2; ++step) {
+    for (size_t i = 0, first = 0; i < count; ++i) {
+      while (times[i] - times[first] > 3.0 * smooth_s) ++first;
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      double weights = 0.0;
+      for (size_t k = first; k < count && times[k] - times[i] <= 3.0 * smooth_s; ++k) {
+        const double distance = (times[k] - times[i]) / smooth_s;
+        const double weight = std::exp(-0.5 * distance * distance);
+        sum += weight * Log<double>(smooth[i].conjugate() * measured[k]);
+        weights += weight;
+      }
+      smooth[i] = smooth[i] * Exp<double>(sum / weights);
+    }
+  }
+  return smooth;
+}
+
+}  // namespace camgyro
