@@ -42,9 +42,9 @@ struct OnePair {
     const TimedPair& timed = input.pairs[0];
     pair->matches = timed.matches;
     pair->matches.resize(std::min<size_t>(100, pair->matches.size()));
-    pair->time_a_s = timed.time_a_s;
-    pair->time_b_s = timed.time_b_s;
-    pair->height_px = truth.height_px;
+    pair->frame_a = timed.first();
+    pair->frame_b = timed.second();
+    pair->size_px << truth.width_px, truth.height_px;
     pair->sigma_px = 0.5;
     pair->robust_threshold = 2.5;
     pair->lens = &GetLens(truth.distortion_model);
@@ -98,7 +98,8 @@ void BearingsOfAPair(benchmark::State& state) {
   PairBearings bearings;
   for (auto _ : state) {
     CHECK(EvaluatePairBearings(*one.pair, chain, one.lens.data(), one.shutter.data(),
-                               one.q_gyro_cam.coeffs().data(), state.range(0) != 0, &bearings));
+                               one.q_gyro_cam.coeffs().data(), nullptr, state.range(0) != 0,
+                               &bearings));
     benchmark::DoNotOptimize(bearings);
   }
 }
@@ -144,7 +145,7 @@ void DirectionSearch(benchmark::State& state) {
   OnePair one;
   PairBearings bearings;
   CHECK(EvaluatePairBearings(*one.pair, one.Chain(), one.lens.data(), one.shutter.data(),
-                             one.q_gyro_cam.coeffs().data(), false, &bearings));
+                             one.q_gyro_cam.coeffs().data(), nullptr, false, &bearings));
   for (auto _ : state) {
     benchmark::DoNotOptimize(FindDirection(bearings, one.pair->variance_a(), one.pair->variance_b(),
                                            one.pair->robust_threshold));

@@ -36,10 +36,11 @@ PairScene RotationScene(uint64_t seed) {
   for (Match match : s.pair->matches) {
     Bearing a;
     EXPECT_TRUE(EvaluateBearing(*s.pair->lens, s.lens, s.shutter, R_gyro_cam, chain,
-                                s.pair->time_a_s, s.pair->height_px, match.px_a, &a));
+                                s.pair->frame_a.stamp_s, s.pair->size_px.y(), match.px_a, &a));
     std::optional<Vector2d> px = match.px_b;
     for (int i = 0; i < 30 && px; ++i) {  // the row decides the time, the time decides the row
-      const double t = RowTimeGyroS(s.pair->time_b_s, s.shutter, px->y(), s.pair->height_px);
+      const double t =
+          RowTimeGyroS(s.pair->frame_b.stamp_s, s.shutter, px->y(), s.pair->size_px.y());
       const Matrix3d R_ref_cam = chain.At(t).R_ref_gyro * R_gyro_cam;
       px = s.pair->lens->Project(R_ref_cam.transpose() * a.ray_ref, s.lens);
     }
@@ -80,8 +81,8 @@ TEST(SymmetricTransfer, IsTheHomographyOfAGlobalShutter) {
   };
   Matrix3d K;
   K << 500, 0, 370, 0, 500, 245, 0, 0, 1;
-  const Matrix3d H_b_a =
-      K * R_ref_cam(s.pair->time_b_s).transpose() * R_ref_cam(s.pair->time_a_s) * K.inverse();
+  const Matrix3d H_b_a = K * R_ref_cam(s.pair->frame_b.stamp_s).transpose() *
+                         R_ref_cam(s.pair->frame_a.stamp_s) * K.inverse();
   const VectorXd r = Residuals(&s);
   for (size_t i = 0; i < s.pair->matches.size(); ++i) {
     const Match& match = s.pair->matches[i];
