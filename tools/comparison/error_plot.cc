@@ -75,10 +75,10 @@ class Panel {
     svg += TextAt(left_, top_ - 8, "font-size=\"12\"", Label(unit.label) + " [" + unit.unit + "]");
     double labelled_y = 1e9;  // of the last label above zero; those below mirror it
     std::vector<double> ticks = {0.0};
-    const double first = std::pow(10.0, std::floor(std::log10(0.5 * linear_)) + 1.0);
-    for (double power = first; power < largest_; power *= 10.0) {
+    for (double power = std::pow(10.0, std::floor(std::log10(0.3 * linear_))); power < largest_;
+         power *= 10.0) {
       for (const double tick : {power, 3.0 * power}) {
-        if (tick < 0.95 * largest_) ticks.push_back(tick);
+        if (tick > 0.3 * linear_ && tick < 0.95 * largest_) ticks.push_back(tick);
       }
     }
     for (const double tick : ticks) {
