@@ -133,5 +133,30 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+// Not in the simulator: the y and z axes are read later than x.
+TEST(GyroAxisDelay, FitsReadingsThatAreShiftedAxisByAxis) {
+  const auto scenario = simulation::ParseScenario(
+      "", {"duration_s=9", "seed=4", "tracks.noise_px=0", "gyro.rate_hz=400",
+           "gyro.noise_density_rad_s_rtHz=0", "gyro.bias_walk_rad_s2_rtHz=0"});
+  ASSERT_TRUE(scenario);
+  auto simulated = simulation::SimulateTracks(*scenario);
+  ASSERT_TRUE(simulated);
+  std::vector<GyroSample>& gyro = simulated->recording.gyro;  // a sample each 2.5 ms
+  for (size_t i = gyro.size() - 1; i >= 3; --i) {
+    gyro[i].omega_gyro_rad_s.y() = gyro[i - 2].omega_gyro_rad_s.y();
+    gyro[i].omega_gyro_rad_s.z() = gyro[i - 3].omega_gyro_rad_s.z();
+  }
+  const EstimationInput input = MakeEstimationInput(simulated->recording);
+  Calibration calibration = simulated->truth;
+  const double without = Rms(input, calibration);
+  const Result<EffectSet> effects =
+      MakeEffects("gyro_axis_delay", MakeEffectSetup(simulated->recording, calibration));
+  ASSERT_TRUE(effects);
+  calibration.effects = std::make_shared<const EffectSet>(*effects);
+  calibration.effect_values = Eigen::Vector2d(0.005, 0.0075);
+  const double with = Rms(input, calibration);
+  EXPECT_LT(with, without / 5.0) << "without " << without << " px, with " << with << " px";
+}
+
 }  // namespace
 }  // namespace camgyro

@@ -138,5 +138,61 @@ TEST_F(CommandsTest, SimulateMakesARecording) {
   EXPECT_EQ(Run("simulate a.yaml camera.focal=3 --out=a").exit_code, 3);
 }
 
+// With an effect that is given, not searched.
+TEST_F(CommandsTest, CalibrateFitsEffects) {
+  Simulate(std::string(kHandheld) + "effects: {radial_distortion: {k1: -0.15, k2: 0.03}}\n", "a");
+  const RunResult run = Run("calibrate a --out=result --effects=radial_distortion,clock_skew");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("radial_distortion"), HasSubstr("skew"), HasSubstr("ppm")));
+  const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
+  ASSERT_EQ(result["effects"].size(), 2u);
+  EXPECT_EQ(result["effects"][0]["name"].as<std::string>(), "radial_distortion");
+  const YAML::Node k1 = result["effects"][0]["parameters"][0];
+  EXPECT_NEAR(k1["value"].as<double>(), -0.15, 4.0 * k1["sigma"].as<double>());
+  // The lens has it, too.
+  const YAML::Node distortion = result["camera"]["distortion"];
+  EXPECT_EQ(distortion["model"].as<std::string>(), "radtan");
+  EXPECT_DOUBLE_EQ(distortion["value"][0].as<double>(), k1["value"].as<double>());
+  EXPECT_DOUBLE_EQ(distortion["sigma"][0].as<double>(), k1["sigma"].as<double>());
+
+  EXPECT_THAT(Run("calibrate a --effects=radial_distorsion").err,
+              HasSubstr("no effect \"radial_distorsion\""));
+  EXPECT_EQ(Run("calibrate a --effects=clock_skew:round").exit_code, 2);
+  EXPECT_EQ(Run("calibrate a --effects=exposure_delay").exit_code, 4);
+}
+
+TEST_F(CommandsTest, DiagnoseSaysIfThereIsTooLittleAndStillCalibrates) {
+  Simulate(kHandheld, "a");
+  const RunResult run = Run("diagnose a --out=result");
+  EXPECT_EQ(run.exit_code, 4);
+  EXPECT_THAT(run.err, HasSubstr("too short to test anything"));
+  EXPECT_TRUE(YAML::LoadFile(Path("result/calibration.yaml"))["camera"]["focal_px"]);
+  EXPECT_TRUE(YAML::LoadFile(Path("result/diagnosis.yaml"))["verdict"]["not_tested"]);
+}
+
+TEST_F(CommandsTest, DiagnoseWritesItsAccount) {
+  std::string longer = kHandheld;
+  longer.replace(longer.find("duration_s: 4"), 13, "duration_s: 9");
+  Simulate(longer + "effects: {radial_distortion: {k1: -0.2, k2: 0.05}}\n", "a");
+  const RunResult run = Run("diagnose a --out=result");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("1. radial_distortion"), HasSubstr("unseen frames: rms"),
+                             HasSubstr("what to do:"), HasSubstr("verdict    radial_distortion")));
+  const YAML::Node diagnosis = YAML::LoadFile(Path("result/diagnosis.yaml"));
+  const YAML::Node round = diagnosis["rounds"][0];
+  EXPECT_EQ(round["added"].as<std::string>(), "radial_distortion");
+  EXPECT_LT(round["unseen_chi2"]["after"].as<double>(),
+            round["unseen_chi2"]["before"].as<double>());
+  for (const char* key : {"name", "statistic", "p_value", "unseen_gain"}) {
+    EXPECT_TRUE(round["candidates"][0][key]) << key;
+  }
+  EXPECT_EQ(diagnosis["verdict"]["effects"][0].as<std::string>(), "radial_distortion");
+  EXPECT_FALSE(diagnosis["verdict"]["unexplained_structure"].as<bool>());
+  EXPECT_TRUE(diagnosis["verdict"]["indistinguishable"].IsSequence());
+  EXPECT_EQ(YAML::LoadFile(Path("result/calibration.yaml"))["effects"].size(), 1u);
+  EXPECT_EQ(YAML::LoadFile(Path("result/calibration_before.yaml"))["effects"].size(), 0u);
+  EXPECT_THAT(ReadFile(Path("result/residual_maps.csv")), HasSubstr("shift over the image"));
+}
+
 }  // namespace
 }  // namespace camgyro
