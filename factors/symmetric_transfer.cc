@@ -80,8 +80,8 @@ bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residu
   const LensParameters lens = Eigen::Map<const LensParameters>(parameters[0]);
   PairBearings bearings;
   const bool derivatives = jacobians != nullptr;
-  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2], nullptr, derivatives,
-                            &bearings)) {
+  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2], nullptr,
+                            derivatives, &bearings)) {
     return false;
   }
   const double inv_sigma = 1.0 / std::sqrt(2.0 * (pair.variance_a() + pair.variance_b()));
@@ -110,8 +110,8 @@ bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residu
       row.Clear();
       into_b.Add(by_e.head<2>(), a, chain, pair.size_px.y(), &row);
       into_a.Add(by_e.tail<2>(), b, chain, pair.size_px.y(), &row);
-      row.Write(kResidualsPerMatch * static_cast<int>(i) + k, 1.0, parameters[2],
-                pair, kFirstRateGroup, jacobians);
+      row.Write(kResidualsPerMatch * static_cast<int>(i) + k, 1.0, parameters[2], pair,
+                kFirstRateGroup, jacobians);
     }
   }
   return true;

@@ -69,7 +69,9 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   LoopInput input;
   input.recording = &recording;
   input.prior = MakePrior(recording, report.start);
-  input.start = report.calibration;
+  input.fit = report.calibration;
+  input.start = input.prior;
+  input.start.bias_gyro_rad_s = report.start.bias_gyro_rad_s;
   input.graph = GraphOptionsFor(recording, report.start, options.calibrate);
   input.noise = report.quality.noise_px;
   if (!(input.noise > 0.0)) input.noise = attitudes ? 2e-3 : 1.0;

@@ -113,9 +113,9 @@ class Loop {
                         " pairs of frames to fit and " + std::to_string(out->choice_pairs) +
                         " to choose by, in " + std::to_string(shares_.choice.size()) +
                         " stretches; at least 30, 30 and 4 are needed";
-      return in_.start;
+      return in_.fit;
     }
-    Calibration start = in_.start;
+    Calibration start = in_.fit;
     start.prior_sigma = in_.prior.prior_sigma;
     const Result<Refined> first = Fit(start, in_.noise);
     if (!first) return tl::unexpected(first.error());
@@ -380,10 +380,32 @@ class Loop {
     };
     std::vector<Rival> rivals;
     const double best_gain = all->front().first.gain.sum;
+    // Far from where the model belongs, a linear gain says little: then a distorting lens, which
+    // throws the plain model off most, is tried in any case, and from where it all began.
+    const bool astray = round == 0 && best_gain > kStrongMisfit * Chi2Of(choice);
     for (size_t i = 0; i < all->size(); ++i) {
       auto& [r, candidate] = (*all)[i];
-      if (!r.rejected.empty()) break;
-      if (static_cast<int>(rivals.size()) >= options_.max_rivals || r.gain.sum < 0.25 * best_gain) {
+      const bool in_any_case = astray && r.name == "radial_distortion";
+      if (in_any_case) r.rejected.clear();
+      if (!r.rejected.empty()) continue;
+      if (candidate.effect->turn_sigma_rad() > 0.0) {
+        // It frees three numbers per pair, whose gain the likelihood ratio has discounted: that one
+        // stands, not the fall of chi2.
+        Calibration turned = fit_.calibration;
+        AddEffect(candidate, &turned);
+        turned.prior_sigma = in_.prior.prior_sigma;
+        const Result<Refined> with_turn = Fit(turned, noise);
+        if (!with_turn) continue;
+        std::vector<double> gain(choice.blocks.size(), 0.0);
+        for (const PairScore& pair : choice.pairs) {
+          gain[static_cast<size_t>(pair.block)] += pair.turn_gain;
+        }
+        r.refitted = true;
+        rivals.push_back({i, *with_turn, std::move(gain)});
+        continue;
+      }
+      if (!in_any_case && (static_cast<int>(rivals.size()) >= options_.max_rivals ||
+                           r.gain.sum < 0.25 * best_gain)) {
         r.rejected = "others gain more";
         continue;
       }
@@ -393,8 +415,7 @@ class Loop {
       if (r.start.size() == columns) start.effect_values.tail(columns) = r.start;
       start.prior_sigma = in_.prior.prior_sigma;
       Result<Refined> fit = Fit(start, noise);
-      if (round == 0 && best_gain > kStrongMisfit * Chi2Of(choice)) {
-        // What the plain model made of the effect may be far off: also from where it all began.
+      if (astray) {
         Calibration anew = in_.start;
         AddEffect(candidate, &anew);
         anew.prior_sigma = in_.prior.prior_sigma;
@@ -434,7 +455,10 @@ class Loop {
     }
     if (rivals.empty()) return false;
     const auto gain_of = [&](const Rival& rival) { return (*all)[rival.at].first.gain.sum; };
-    const auto size_of = [&](const Rival& rival) { return (*all)[rival.at].first.parameters; };
+    const auto size_of = [&](const Rival& rival) {
+      const bool turn = (*all)[rival.at].second.effect->turn_sigma_rad() > 0.0;
+      return turn ? 1000 : (*all)[rival.at].first.parameters;
+    };
     size_t winner = 0;
     for (size_t i = 1; i < rivals.size(); ++i) {
       if (gain_of(rivals[i]) > gain_of(rivals[winner])) winner = i;

@@ -33,7 +33,7 @@ Diagnosis Find(const Recording& recording) {
   input.start.readout_s = 0.0167;
   input.start.q_gyro_cam =
       simulation::MountOptions::DefaultRotation() * Exp(Eigen::Vector3d(0.01, -0.01, 0.01));
-  input.prior = input.start;
+  input.prior = input.fit = input.start;
   input.prior.prior_sigma << 97.0, 17.0, 17.0, 0.02, 0.05, Eigen::Vector3d::Constant(0.1),
       Eigen::Vector3d::Constant(0.15);
   input.graph.match_noise = recording.match_noise;
