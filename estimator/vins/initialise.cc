@@ -22,6 +22,7 @@ constexpr double kMinParallaxNoises = 5.0;
 constexpr double kMaxGravityErrorMS2 = 3.0;
 constexpr double kMaxAccelNoiseFactor = 15.0;
 constexpr double kMinInlierRatio = 0.5;
+constexpr double kMaxNoiseRad = 5e-3;  // of a tracked point: 3 px at 600 px of focal length
 
 [[gnu::format(printf, 1, 2)]] std::string Format(const char* format, ...) {
   va_list arguments;
@@ -167,12 +168,13 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
   }
   start.inlier_ratio =
       static_cast<double>(start.observations) / static_cast<double>(window->observations.size());
-  if (start.inlier_ratio < kMinInlierRatio) {
+  if (start.inlier_ratio < kMinInlierRatio ||
+      start.noise_px > kMaxNoiseRad * start.calibration.lens[kFocal]) {
     return Refuse(
         start, VinsVerdict::kCalibrationImplausible,
-        Format("only %.0f %% of the tracked points agree with the gyro's rotations: wrong "
-               "delay, mounting, lens or readout time?",
-               100.0 * start.inlier_ratio));
+        Format("%.0f %% of the tracked points agree with the gyro's rotations, to %.1f px: "
+               "wrong delay, mounting, lens or readout time?",
+               100.0 * start.inlier_ratio, start.noise_px));
   }
   if (start.accel_noise_factor > kMaxAccelNoiseFactor) {
     return Refuse(

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "estimator/calibrate.h"
+#include "tools/benchmark/benchmark.h"
 #include "tools/recording_input.h"
-#include "tools/vins_benchmark/benchmark.h"
 
 DEFINE_string(what, "initialisation", "initialisation, or delay: Feng's search over a recording");
 DEFINE_string(simulate, "walking,running,handheld", "motions to simulate, comma-separated");

@@ -7,7 +7,7 @@
 #include "core/imu_integral.h"
 #include "core/time.h"
 #include "estimator/start/slerp_delay_search.h"
-#include "tools/vins_benchmark/benchmark.h"
+#include "tools/benchmark/benchmark.h"
 
 namespace camgyro {
 namespace {

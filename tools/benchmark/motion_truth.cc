@@ -1,4 +1,4 @@
-#include "tools/vins_benchmark/motion_truth.h"
+#include "tools/benchmark/motion_truth.h"
 
 #include <algorithm>
 #include <cmath>

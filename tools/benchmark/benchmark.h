@@ -1,6 +1,6 @@
 // Before and after: what a calibration is worth to a VIO that starts, and to Feng et al.'s search.
-#ifndef CAMGYRO_TOOLS_VINS_BENCHMARK_BENCHMARK_H_
-#define CAMGYRO_TOOLS_VINS_BENCHMARK_BENCHMARK_H_
+#ifndef CAMGYRO_TOOLS_BENCHMARK_BENCHMARK_H_
+#define CAMGYRO_TOOLS_BENCHMARK_BENCHMARK_H_
 
 #include <memory>
 #include <string>
@@ -10,7 +10,7 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/vins/initialise.h"
-#include "tools/vins_benchmark/motion_truth.h"
+#include "tools/benchmark/motion_truth.h"
 
 namespace camgyro {
 
@@ -44,4 +44,4 @@ Status BenchmarkDelaySearch(const std::string& name, const Recording& recording,
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TOOLS_VINS_BENCHMARK_BENCHMARK_H_
+#endif  // CAMGYRO_TOOLS_BENCHMARK_BENCHMARK_H_
