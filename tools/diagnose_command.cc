@@ -6,6 +6,7 @@
 #include "estimator/diagnosis/diagnose.h"
 #include "tools/commands.h"
 #include "tools/diagnosis_file.h"
+#include "tools/diagnosis_report.h"
 #include "tools/recording_input.h"
 #include "tools/result_files.h"
 #include "tools/summary.h"
@@ -48,7 +49,15 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   const bool attitudes = HasOnlyAttitudes(*recording);
   files.Add("diagnosis.yaml", DiagnosisYaml(diagnosis));
   if (diagnosis.before) {
-    files.Add("calibration.yaml", CalibrationYaml(diagnosis.result(), attitudes));
+    const std::string yaml = CalibrationYaml(diagnosis.result(), attitudes);
+    files.Add("calibration.yaml", yaml);
+    const Command command = DiagnoseCommand();
+    const Result<std::string> html =
+        DiagnosisReportHtml(*recording, diagnosis,
+                            {CommandLineOf(command, arguments), DescribeRecording(*recording),
+                             FlagValues(command), yaml});
+    if (!html) return tl::unexpected(html.error());
+    files.Add("report.html", *html);
     files.Add("trace.csv", TraceCsv(diagnosis.result().trace));
     files.Add("delay.csv", DelayCsv(diagnosis.result().start.curve));
     files.Add("residual_maps.csv", ResidualMapsCsv(diagnosis));
@@ -65,9 +74,10 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
     std::printf("%s", Notes("doubt", diagnosis.result().doubts).c_str());
   }
   if (!FLAGS_quiet) {
-    std::printf(
-        "written    %s/diagnosis.yaml%s\n", files.folder().c_str(),
-        diagnosis.before ? ", calibration.yaml, residual_maps.csv, trace.csv, delay.csv" : "");
+    std::printf("written    %s/diagnosis.yaml%s\n", files.folder().c_str(),
+                diagnosis.before
+                    ? ", calibration.yaml, report.html, residual_maps.csv, trace.csv, delay.csv"
+                    : "");
   }
   if (diagnosis.refusal) return Refusal(*recording, *diagnosis.refusal);
   if (!diagnosis.not_tested.empty()) return CannotEstimate("diagnosis: " + diagnosis.not_tested);

@@ -191,6 +191,9 @@ TEST_F(CommandsTest, DiagnoseWritesItsAccount) {
   EXPECT_TRUE(diagnosis["verdict"]["indistinguishable"].IsSequence());
   EXPECT_EQ(YAML::LoadFile(Path("result/calibration.yaml"))["effects"].size(), 1u);
   EXPECT_EQ(YAML::LoadFile(Path("result/calibration_before.yaml"))["effects"].size(), 0u);
+  EXPECT_THAT(ReadFile(Path("result/report.html")),
+              AllOf(HasSubstr("Found: radial_distortion"), HasSubstr("map-image"),
+                    HasSubstr("rate error over time")));
   EXPECT_THAT(ReadFile(Path("result/residual_maps.csv")), HasSubstr("shift over the image"));
 }
 
