@@ -79,8 +79,9 @@ class Problem {
     Build();
     ceres::Solver::Options options;
     options.linear_solver_type = nodes_.size() > 40 ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
-    options.max_num_iterations = 40;
-    options.function_tolerance = 1e-7;
+    // Before the last round only noise and outliers are wanted.
+    options.max_num_iterations = last ? 30 : 10;
+    options.function_tolerance = last ? 1e-7 : 1e-4;
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
