@@ -224,7 +224,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   }
   const PairGraphOptions graph_options = GraphOptionsFor(recording, *start, options);
 
-  if (!attitudes) {
+  if (!attitudes && options.online) {
     SlidingWindowOptions window_options = options.window;
     window_options.graph = graph_options;
     SlidingWindow window(estimate, prior, input.origin_ns, window_options);

@@ -29,6 +29,7 @@ struct CalibrateOptions {
   // to begin from.
   std::optional<StartResult> given_start;
   std::optional<Calibration> from;
+  bool online = true;  // false: no sliding window, the refinement alone
   FocalScanOptions focal_scan;
   SlidingWindowOptions window;
   RefinementOptions refinement;

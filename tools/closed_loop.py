@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import matplotlib
 import yaml
@@ -194,12 +194,9 @@ def plot_image(results, name, file):
     plt.close(figure)
 
 
-def main():
-    camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
-    plt.rcParams.update({"font.size": 9, "svg.hashsalt": "camgyro"})
-    folder = tempfile.mkdtemp(prefix="closed_loop_")
-    with ThreadPoolExecutor(2) as pool:
-        results = list(pool.map(lambda name: diagnose(camgyro, name, folder), NAMES))
+def write(results):
+    """The document from what is there so far: a long run that is cut off leaves what it has."""
+    results = sorted(results, key=lambda r: NAMES.index(r["name"]))
     for name in ("D12", "D13"):
         plot_over_axis(results, "tablet-attitude/" + name,
                        "rate error over the angular acceleration", ["x", "y", "z"], 1e3,
@@ -209,6 +206,7 @@ def main():
                    ("time [s]", "delay left [ms]"), "closed_loop_skew.svg")
     plot_image(results, "ov_handheld_rs", "closed_loop_ov.svg")
     plot_image(results, "euroc-v101-flight", "closed_loop_euroc.svg")
+    missing = [name for name in NAMES if name not in [r["name"] for r in results]]
     with open(SOURCE + "/docs/closed_loop.md", "w", encoding="utf-8") as out:
         out.write("# The closed loop on measured data\n\nMade by `tools/closed_loop.py`; the text "
                   "before the tables is `docs/closed_loop_notes.md`.\n\n")
@@ -220,6 +218,8 @@ def main():
                   "stretches, one per effect.\n\n")
         out.write(table(["Recording", "Exit", "Effects", "rms", "chi2/dof", "fall of chi2", "Left"],
                         [row(r) for r in results]))
+        if missing:
+            out.write("\nNot run: " + ", ".join(missing) + ".\n")
         out.write("\n## Size of the effects\n\nFrom the fit on all frames.\n\n")
         out.write(table(["Recording", "Effect", "Parameter", "Value"],
                         [p for r in results for p in parameters(r)]))
@@ -228,6 +228,21 @@ def main():
                          "t_d with"], [state(r) for r in results if "calibration_before" in r]))
         out.write("\nSeconds, two recordings at a time: " + ", ".join(
             "%s %.0f" % (r["name"], r["seconds"]) for r in results) + ".\n")
+
+
+def main():
+    camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
+    plt.rcParams.update({"font.size": 9, "svg.hashsalt": "camgyro"})
+    folder = tempfile.mkdtemp(prefix="closed_loop_")
+    results = []
+    with ThreadPoolExecutor(2) as pool:
+        # The short ones, attitudes, first.
+        order = sorted(NAMES, key=lambda name: ("gopro-hero5" in name, name.startswith("ov_"),
+                                                not name.startswith("tablet")))
+        for done in as_completed([pool.submit(diagnose, camgyro, name, folder)
+                                  for name in order]):
+            results.append(done.result())
+            write(results)
     shutil.rmtree(folder)
 
 

@@ -58,7 +58,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
                              FlagValues(command), yaml});
     if (!html) return tl::unexpected(html.error());
     files.Add("report.html", *html);
-    files.Add("trace.csv", TraceCsv(diagnosis.result().trace));
+    files.Add("trace.csv", TraceCsv(diagnosis.before->trace));
     files.Add("delay.csv", DelayCsv(diagnosis.result().start.curve));
     files.Add("residual_maps.csv", ResidualMapsCsv(diagnosis));
     if (diagnosis.after) {

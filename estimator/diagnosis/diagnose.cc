@@ -93,6 +93,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
     CalibrateOptions with = options.calibrate;
     with.given_start = report.start;
     with.from = *found;
+    with.online = false;
     const Result<CalibrationReport> after =
         CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));
     if (after) diagnosis.after = *after;
