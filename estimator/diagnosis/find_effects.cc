@@ -108,11 +108,11 @@ class Loop {
     out->fit_pairs = static_cast<int>(Joined(shares_.fit).size());
     out->choice_pairs = static_cast<int>(Joined(shares_.choice).size());
     out->report_pairs = static_cast<int>(Joined(shares_.report).size());
-    if (shares_.choice.size() < 4 || out->fit_pairs < 30 || out->choice_pairs < 30) {
+    if (shares_.choice.size() < 4 || out->fit_pairs < 25 || out->choice_pairs < 25) {
       out->not_tested = "too short to test anything: " + std::to_string(out->fit_pairs) +
                         " pairs of frames to fit and " + std::to_string(out->choice_pairs) +
                         " to choose by, in " + std::to_string(shares_.choice.size()) +
-                        " stretches; at least 30, 30 and 4 are needed";
+                        " stretches; at least 25, 25 and 4 are needed";
       return in_.fit;
     }
     Calibration start = in_.fit;

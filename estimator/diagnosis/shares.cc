@@ -34,7 +34,7 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input) {
   const double begin_s = input.pairs.front().time_a_s;
   const double duration_s = input.pairs.back().time_b_s - begin_s;
   shares.block_s =
-      std::max(std::clamp(duration_s / 40.0, 0.2, 3.0), 8.0 * MedianInterval(recording.frames));
+      std::max(std::clamp(duration_s / 40.0, 0.2, 3.0), 6.0 * MedianInterval(recording.frames));
   const auto block_of = [&](double time_s) {
     return static_cast<int64_t>(std::floor((time_s - begin_s) / shares.block_s));
   };

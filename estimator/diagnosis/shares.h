@@ -25,7 +25,7 @@ struct Shares {
 };
 
 // Short blocks, so that what changes with time is seen by all shares: 1/40 of the recording, within
-// 0.2 and 3 s, at least 8 frames.
+// 0.2 and 3 s, at least 6 frames.
 Shares MakeShares(const Recording& recording, const EstimationInput& input);
 
 std::vector<TimedPair> Joined(const std::vector<PairBlock>& blocks);

@@ -162,7 +162,9 @@ TEST_F(CommandsTest, CalibrateFitsEffects) {
 }
 
 TEST_F(CommandsTest, DiagnoseSaysIfThereIsTooLittleAndStillCalibrates) {
-  Simulate(kHandheld, "a");
+  std::string shorter = kHandheld;
+  shorter.replace(shorter.find("duration_s: 4"), 13, "duration_s: 3");
+  Simulate(shorter, "a");
   const RunResult run = Run("diagnose a --out=result");
   EXPECT_EQ(run.exit_code, 4);
   EXPECT_THAT(run.err, HasSubstr("too short to test anything"));
