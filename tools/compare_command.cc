@@ -12,6 +12,7 @@
 #include "tools/comparison/information_bound.h"
 #include "tools/comparison/processes.h"
 #include "tools/progress_bar.h"
+#include "tools/report/page.h"
 #include "tools/result_files.h"
 
 DEFINE_string(estimators, "window,refinement,ekf", "which to run, in this order");
@@ -182,22 +183,31 @@ Status RunCompare(const std::vector<std::string>& arguments) {
   }
   const Result<std::vector<CaseResult>> results = RunAll(plan);
   if (!results) return tl::unexpected(results.error());
+  std::vector<ReportSection> sections;
   for (const CaseResult& result : *results) {
-    std::printf("%s%s", &result == &results->front() ? "" : "\n", CaseTable(result).c_str());
+    const std::string table = CaseTable(result);
+    std::printf("%s%s", &result == &results->front() ? "" : "\n", table.c_str());
     const int frames = result.runs.front().estimators.front().frames;
-    files.Add("errors_" + result.name + ".svg",
-              comparison::ErrorPlotSvg(result.name + ", " + std::to_string(frames) + " frames",
-                                       result.runs.front()));
+    const std::string svg = comparison::ErrorPlotSvg(
+        result.name + ", " + std::to_string(frames) + " frames", result.runs.front());
+    files.Add("errors_" + result.name + ".svg", svg);
+    sections.push_back({"case-" + std::to_string(sections.size()), result.name,
+                        "<pre>" + EscapeHtml(table) +
+                            "</pre>\n<svg style=\"max-width:100%;height:auto\"" +
+                            svg.substr(svg.find("<svg") + 4)});
   }
   if (FLAGS_out.empty()) return {};
+  files.Add("report.html", ReportPage("Comparison with the truth", "", sections));
   files.Add("compare.md", comparison::ComparisonMarkdown(*results));
   files.Add("compare.yaml", comparison::ComparisonYaml(*results));
   files.Add("runs.csv", comparison::RunsCsv(*results));
   files.Add("traces.csv", comparison::TracesCsv(*results));
   if (Status written = files.Write(); !written) return written;
   if (!FLAGS_quiet) {
-    std::printf("\nwritten    %s/compare.md, compare.yaml, runs.csv, traces.csv, errors_*.svg\n",
-                files.folder().c_str());
+    std::printf(
+        "\nwritten    %s/report.html, compare.md, compare.yaml, runs.csv, traces.csv, "
+        "errors_*.svg\n",
+        files.folder().c_str());
   }
   return {};
 }

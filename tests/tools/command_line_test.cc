@@ -81,7 +81,8 @@ TEST_F(CommandLineTest, HelpListsEveryCommandAndItsFlags) {
 
 // The pages quote the help word by word.
 TEST_F(CommandLineTest, DocumentationQuotesTheHelp) {
-  for (const char* name : {"calibrate", "diagnose", "track", "delay", "export", "stabilize"}) {
+  for (const char* name :
+       {"calibrate", "diagnose", "track", "delay", "simulate", "compare", "export", "stabilize"}) {
     SCOPED_TRACE(name);
     std::stringstream help(Run("help " + std::string(name)).out);
     std::string quoted, line;
