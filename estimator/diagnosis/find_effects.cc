@@ -382,7 +382,8 @@ class Loop {
     const double best_gain = all->front().first.gain.sum;
     // Far from where the model belongs, a linear gain says little: then a distorting lens, which
     // throws the plain model off most, is tried in any case, and from where it all began.
-    const bool astray = round == 0 && best_gain > kStrongMisfit * Chi2Of(choice);
+    const bool astray =
+        round == 0 && (best_gain > kStrongMisfit * Chi2Of(choice) || HasRunAway(fit_.calibration));
     for (size_t i = 0; i < all->size(); ++i) {
       auto& [r, candidate] = (*all)[i];
       const bool in_any_case = astray && r.name == "radial_distortion";
@@ -512,6 +513,14 @@ class Loop {
     }
     calibration->effects = set;
     return remade;
+  }
+
+  // Focal length 15 % or centre 5 % of the diagonal from where it all began.
+  bool HasRunAway(const Calibration& c) const {
+    const LensParameters& start = in_.start.lens;
+    return std::abs(c.lens[kFocal] / start[kFocal] - 1.0) > 0.15 ||
+           std::hypot(c.lens[kCx] - start[kCx], c.lens[kCy] - start[kCy]) >
+               0.05 * std::hypot(c.width_px, c.height_px);
   }
 
   double FitChi2(const Refined& fit) const { return fit.quality.rms_px; }
