@@ -14,6 +14,9 @@ if(CAMGYRO_SANITIZE)
   target_compile_options(camgyro_build_flags INTERFACE -fsanitize=${CAMGYRO_SANITIZE}
                          -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(camgyro_build_flags INTERFACE -fsanitize=${CAMGYRO_SANITIZE})
+  # As in Debian's Ceres: otherwise Eigen's code allocates differently under AddressSanitizer, and
+  # what one of the two allocates the other one cannot free.
+  target_compile_definitions(camgyro_build_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 target_compile_definitions(camgyro_build_flags
                            INTERFACE $<$<CONFIG:Debug>:EIGEN_INITIALIZE_MATRICES_BY_NAN>)
