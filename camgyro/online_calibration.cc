@@ -106,6 +106,8 @@ Status OnlineCalibration::TryStart() {
       options, {});
   if (!start) return tl::unexpected(start.error());
 
+  gap_ = SelectPairs(recording, /*longest_gap=*/10, /*least_pairs=*/10).gap;
+
   const Calibration prior = MakePrior(recording, *start);
   prior_sigma_ = prior.prior_sigma;
   Calibration from = prior;
@@ -121,16 +123,31 @@ Status OnlineCalibration::TryStart() {
 }
 
 void OnlineCalibration::ProcessWaiting() {
-  while (frames_.size() >= 2) {
-    if (!AddPair(frames_[0], frames_[1])) {
+  // Side by side, and without a common observation where each has its own error; see SelectPairs.
+  const size_t between = noise_ == MatchNoise::kBothImages && gap_ > 1 ? 1 : 0;
+  while (frames_.size() > static_cast<size_t>(gap_) + between) {
+    const size_t gap = NextGap();
+    if (!AddPair(frames_[0], frames_[gap])) {
       if (frames_.size() <= kMaxWaiting) break;
       ++skipped_here_;
     }
-    frames_.pop_front();
+    frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(gap + between));
   }
   progress_.pairs_used = used_before_ + static_cast<uint64_t>(window_->num_used_pairs());
   progress_.pairs_skipped =
       skipped_before_ + skipped_here_ + static_cast<uint64_t>(window_->num_skipped_pairs());
+}
+
+// The longest gap that keeps its matches: the motion may be faster than when the gap was chosen.
+size_t OnlineCalibration::NextGap() const {
+  const auto gap = static_cast<size_t>(gap_);
+  const auto matches = [&](size_t to) {
+    return static_cast<double>(MatchesBetween(frames_[0].points, frames_[to].points).size());
+  };
+  for (size_t shorter = gap; shorter > 1; --shorter) {
+    if (matches(shorter) >= 0.6 * matches(1)) return shorter;
+  }
+  return 1;
 }
 
 // False if the gyro has not come so far.

@@ -50,6 +50,8 @@ class OnlineCalibration {
   Status TryStart();
   void ProcessWaiting();
   bool AddPair(const OnlineFrame& a, const OnlineFrame& b);
+  // How far the second frame of the next pair lies from the first.
+  size_t NextGap() const;
   void Remember(const WindowUpdate& update);
   void GiveUp();
 
@@ -64,6 +66,7 @@ class OnlineCalibration {
   std::deque<OnlineFrame> frames_;  // collected, or waiting for the gyro; the first was used
   int64_t next_start_ns_ = 0;       // camera clock: no search before
   std::optional<SlidingWindow> window_;
+  int gap_ = 1;                                    // of the pairs, at most; see SelectPairs
   uint64_t used_before_ = 0, skipped_before_ = 0;  // by windows that were given up
   uint64_t skipped_here_ = 0;                      // frames that waited too long
   int64_t last_solved_ns_ = 0;                     // frame of the latest solved window

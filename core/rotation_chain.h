@@ -4,16 +4,32 @@
 #define CAMGYRO_CORE_ROTATION_CHAIN_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 namespace camgyro {
 
+// What a RotationChain wants of a gyro sample, given the samples before and after it: the straight
+// lines between these values have the integrals of the curve through the samples (Gregory's rule,
+// to fourth order in the sampling interval h). Straight lines between the samples themselves lose
+// (2 pi nu h)^2 / 12 of what turns at frequency nu, and a focal length from them is as much too
+// long: 4e-4 at 200 Hz for a person who runs.
+inline Eigen::Vector3d ChainRate(const Eigen::Vector3d& before, const Eigen::Vector3d& rate,
+                                 const Eigen::Vector3d& after, double interval_before_s,
+                                 double interval_after_s) {
+  const double p = interval_before_s, n = interval_after_s;
+  // (p^3 + n^3) / (p + n) / 12 times the second derivative; bounded, for samples with one stamp.
+  const double uneven = std::min(3.0, (p * p - p * n + n * n) / (p * n));
+  return rate - uneven / (6.0 * (p + n)) * (p * (after - rate) - n * (rate - before));
+}
+
 // R_ref_gyro(t): maps vectors of the gyro frame at t into the gyro frame at the first sample.
 //
-// Between two samples the rate is linear in time (the paper holds it constant, which delays the
-// gyro by half a sampling interval); its integral theta(t) over a segment gives Exp(theta). What
-// this neglects, the commutator of the two rates, is dt^2/12 |w0 x w1| <= 1e-5 rad per segment at
-// 100 Hz and 10 rad/s^2. Before the first and after the last sample the rate is held.
+// Between two given rates (ChainRate) the rate is linear in time (the paper holds it constant,
+// which delays the gyro by half a sampling interval); its integral theta(t) over a segment gives
+// Exp(theta). What this neglects, the commutator of the two rates, is dt^2/12 |w0 x w1| <= 1e-5 rad
+// per segment at 100 Hz and 10 rad/s^2. Before the first and after the last sample the rate is
+// held.
 class RotationChain {
  public:
   // What an observation at one time needs, and what its derivatives need.

@@ -90,6 +90,8 @@ void MarkDetermined(bool attitudes, Calibration* c) {
     c->determined[static_cast<size_t>(i)] =
         !(attitudes && pixels_needed) && sigma[i] < useful[i] && sigma[i] < 0.5 * c->prior_sigma[i];
   }
+  // Rows are timed by the angles between them: without a focal length there are none.
+  if (!c->determined[kStateFocal]) c->determined[kStateReadout] = false;
 }
 
 void AddDoubts(const Recording& recording, CalibrationReport* report) {
@@ -197,7 +199,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   CalibrationReport report;
   StageClock clock(&report.times);
   const bool attitudes = recording.matches.empty() && recording.tracks.empty();
-  const EstimationInput input = MakeEstimationInput(recording);
+  const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
 
   tell("start", 0.0);
   const Result<StartResult> start =
@@ -231,8 +233,9 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     window.SetListener([&](const WindowUpdate& update) { report.trace.push_back(update); });
     // In the order of real time: a sample is known when its time has come, a frame at its stamp.
     size_t next_sample = 0;
-    for (size_t i = 0; i < input.pairs.size(); ++i) {
-      const TimedPair& pair = input.pairs[i];
+    const std::vector<TimedPair> pairs = SideBySide(input.pairs);
+    for (size_t i = 0; i < pairs.size(); ++i) {
+      const TimedPair& pair = pairs[i];
       for (; next_sample < input.rates.size() &&
              input.rates[next_sample].time_s <= pair.time_b_s + estimate.delay_s;
            ++next_sample) {
@@ -249,7 +252,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                         std::to_string(pair.frame_b) +
                         ": the stamp repeats or goes back, or a pixel is not finite");
       }
-      if (i % 20 == 0) tell("window", static_cast<double>(i) / input.pairs.size());
+      if (i % 20 == 0) tell("window", static_cast<double>(i) / static_cast<double>(pairs.size()));
     }
     for (; next_sample < input.rates.size(); ++next_sample) {
       if (window.AddGyroSample(recording.gyro[next_sample], input.rates[next_sample].saturated) !=
@@ -279,12 +282,14 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     tell("refinement", 0.0);
     double halves_chi2 = 0.0;
     if (static_cast<int>(input.pairs.size()) >= kMinPairsForUnseen) {
-      // Each half is fitted alone, and the other one tells how well. The pair in the middle belongs
-      // to neither, so that no frame is in both.
+      // Each half is fitted alone, and the other one tells how well. The pairs across the
+      // middle belong to neither, so that no frame is in both.
       const auto middle = input.pairs.begin() + static_cast<std::ptrdiff_t>(input.pairs.size() / 2);
-      const std::array<std::vector<TimedPair>, 2> halves = {
-          std::vector<TimedPair>(input.pairs.begin(), middle),
-          std::vector<TimedPair>(middle + 1, input.pairs.end())};
+      std::array<std::vector<TimedPair>, 2> halves;
+      halves[0].assign(input.pairs.begin(), middle);
+      for (auto pair = middle; pair != input.pairs.end(); ++pair) {
+        if (pair->time_a_s > halves[0].back().time_b_s) halves[1].push_back(*pair);
+      }
       std::array<Calibration, 2> fits;
       RefinementOptions half_options = refinement;
       half_options.max_rounds = std::min(4, refinement.max_rounds);

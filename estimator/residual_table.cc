@@ -2,9 +2,7 @@
 
 #include <cmath>
 
-#include "estimator/window/direction_search.h"
 #include "estimator/window/pair_view.h"
-#include "factors/coplanarity_plane.h"
 
 namespace camgyro {
 
@@ -19,10 +17,7 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
     if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
     const PairBearings& bearings = view.bearings;
     if (bearings.a.size() < PairGraph::kMinMatches) continue;
-    const double variance_a = view.measurement.variance_a();
-    const double variance_b = view.measurement.variance_b();
-    const Eigen::Vector3d tau =
-        FindDirection(bearings, variance_a, variance_b, options.robust_threshold).tau;
+    const PairPlane plane = FitPlane(view);
     for (size_t i = 0; i < bearings.a.size(); ++i) {
       const Bearing &a = bearings.a[i], &b = bearings.b[i];
       MatchResidual row;
@@ -31,9 +26,9 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
       row.match = view.measurement.matches[i];
       row.time_s = RowTimeGyroS(pair.time_b_s, shutter, row.match.px_b.y(), calibration.height_px);
       row.rate_rad_s = b.omega_cam_rad_s.norm();
-      const double sigmas = EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau,
-                                                  variance_a, variance_b)
-                                .value;
+      const double sigmas = ResidualOf(view, plane, i).value;
+      const double share = CoplanarityPlane::RowShare(view.measurement, row.match);
+      const Eigen::Vector3d tau = plane.tau + share * plane.turn;
       row.residual_px = sigmas * noise_px;
       row.inlier = std::abs(sigmas) <= options.robust_threshold;
       // tau . (a x b) = (tau x a) . b moves with px_b as this gradient says.

@@ -17,8 +17,8 @@ CoplanarityDeterminant::CoplanarityDeterminant(std::shared_ptr<const PairMeasure
   set_num_residuals(static_cast<int>(triplets_.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4};
   if (pair_->effects) mutable_parameter_block_sizes()->push_back(pair_->effects->size());
-  for (const int size : pair_->rate_group_sizes) {
-    mutable_parameter_block_sizes()->push_back(3 * size);
+  for (size_t g = 0; g < pair_->rate_group_sizes.size(); ++g) {
+    mutable_parameter_block_sizes()->push_back(3 * pair_->num_rate_values(g));
   }
 }
 
@@ -28,7 +28,7 @@ bool CoplanarityDeterminant::Evaluate(double const* const* parameters, double* r
   using Eigen::Vector3d;
   const PairMeasurement& pair = *pair_;
   const int first_rate_group = kEffectsBlock + NumEffectBlocks(pair);
-  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + first_rate_group);
+  const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + first_rate_group);
   const RotationChain chain(pair.rate_times_s, rates);
   PairBearings bearings;
   if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],

@@ -41,8 +41,8 @@ CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
   set_num_residuals(static_cast<int>(pair_->matches.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3, 3};
   if (pair_->effects) mutable_parameter_block_sizes()->push_back(pair_->effects->size());
-  for (const int size : pair_->rate_group_sizes) {
-    mutable_parameter_block_sizes()->push_back(3 * size);
+  for (size_t g = 0; g < pair_->rate_group_sizes.size(); ++g) {
+    mutable_parameter_block_sizes()->push_back(3 * pair_->num_rate_values(g));
   }
 }
 
@@ -50,7 +50,7 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
                                 double** jacobians) const {
   const PairMeasurement& pair = *pair_;
   const int first_rate_group = kEffectsBlock + NumEffectBlocks(pair);
-  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + first_rate_group);
+  const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + first_rate_group);
   const RotationChain chain(pair.rate_times_s, rates);
   PairBearings bearings;
   if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],
@@ -60,22 +60,20 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
   }
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
   const Eigen::Vector3d turn = Eigen::Map<const Eigen::Vector3d>(parameters[kTurnBlock]);
-  const double readout = parameters[1][kReadout];
   PairRow row(chain.size());
   for (size_t i = 0; i < pair.matches.size(); ++i) {
     const Bearing& a = bearings.a[i];
     const Bearing& b = bearings.b[i];
     const double share = RowShare(pair, pair.matches[i]);
     const PlaneResidual r =
-        EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
-                              tau + readout * share * turn, pair.variance_a(), pair.variance_b());
+        EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau + share * turn,
+                              pair.variance_a(), pair.variance_b());
     const RobustResidual robust = Robustify(r.value, pair.robust_threshold);
     residuals[i] = robust.value;
     if (jacobians == nullptr) continue;
     row.Clear();
     row.Add(a, chain, pair.size_px.y(), r.by_a, r.by_J_a);
     row.Add(b, chain, pair.size_px.y(), r.by_b, r.by_J_b);
-    row.AddReadout(share * r.by_tau.dot(turn));
     row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair, first_rate_group,
               jacobians);
     if (jacobians[kTauBlock] != nullptr) {
@@ -83,7 +81,7 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
     }
     if (jacobians[kTurnBlock] != nullptr) {
       Eigen::Map<Eigen::Vector3d>(jacobians[kTurnBlock] + 3 * i) =
-          robust.derivative * readout * share * r.by_tau;
+          robust.derivative * share * r.by_tau;
     }
   }
   return true;

@@ -28,19 +28,19 @@ PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matri
 // All matches of a pair against one plane, that may turn with the rows.
 //
 //   r_i = Robustify( tau_i . n_i / sigma_i ),  n_i = (R_i f_i) x (R'_i f'_i)          eq. (4)
-//   tau_i = tau + s_i turn,   s_i = t_r / (t_b - t_a) * ((v_i + v'_i) / 2h - 1/2)
+//   tau_i = tau + s_i turn,   s_i = (v_i + v'_i) / 2h - 1/2
 //
 // Eq. (4) takes one translation direction for the whole pair. With a rolling shutter the top rows
 // of the two frames are joined by an earlier stretch of the path than the bottom rows; where the
-// path bends, their directions differ by the bend over t_r. `turn` is that change per interval of
-// the pair; it has no effect with a global shutter.
+// path bends, their directions differ by the bend over t_r. `turn` is that change from top to
+// bottom, and no product with t_r: the prior of a factor of t_r would pull on t_r.
 //
 // Parameters  lens         8   LensParameters
 //             shutter      2   t_d [s], t_r [s]
 //             q_gyro_cam   4   RotationManifold
 //             tau          3   SphereManifold<3>: translation direction in the pair's reference,
 //                              the gyro frame at the first rate (sign without meaning)
-//             turn         3   change of tau over the interval of the pair [rad]; give it a prior
+//             turn         3   change of tau from the top to the bottom row [rad]; give it a prior
 //             effects      of PairMeasurement::effects, if there are any
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    one per match, in sigmas. sigma_i is propagated through lens, readout and rotation,
@@ -59,10 +59,9 @@ class CoplanarityPlane final : public ceres::CostFunction {
   static constexpr int kTurnBlock = 4;
   static constexpr int kEffectsBlock = 5;  // the first rate group without effects
 
-  // s_i of a match, per second of readout.
+  // s_i of a match.
   static double RowShare(const PairMeasurement& pair, const Match& match) {
-    return (0.5 * (match.px_a.y() + match.px_b.y()) / pair.size_px.y() - 0.5) /
-           (pair.frame_b.stamp_s - pair.frame_a.stamp_s);
+    return 0.5 * (match.px_a.y() + match.px_b.y()) / pair.size_px.y() - 0.5;
   }
 
  private:

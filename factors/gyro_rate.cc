@@ -2,6 +2,7 @@
 
 #include <glog/logging.h>
 
+#include <cmath>
 #include <utility>
 
 namespace camgyro {
@@ -9,7 +10,7 @@ namespace camgyro {
 GyroRate::GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d& sigma_rad_s,
                    std::shared_ptr<const EffectSet> effects, std::vector<double> times_s)
     : measured_(measured_rad_s),
-      inv_sigma_(sigma_rad_s.cwiseInverse()),
+      inv_sigma_(sigma_rad_s.cwiseInverse().replicate(1, measured_rad_s.cols())),
       effects_(std::move(effects)),
       times_s_(std::move(times_s)) {
   CHECK_GT(sigma_rad_s.minCoeff(), 0.0);
@@ -20,6 +21,15 @@ GyroRate::GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d
   if (effects_) {
     CHECK_EQ(static_cast<Eigen::Index>(times_s_.size()), measured_.cols());
     mutable_parameter_block_sizes()->push_back(effects_->size());
+  }
+}
+
+GyroRate::GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const std::vector<int>& samples,
+                   const Eigen::Vector3d& sigma_rad_s)
+    : GyroRate(measured_rad_s, sigma_rad_s) {
+  CHECK_EQ(static_cast<Eigen::Index>(samples.size()), measured_.cols());
+  for (size_t i = 0; i < samples.size(); ++i) {
+    inv_sigma_.col(static_cast<Eigen::Index>(i)) *= std::sqrt(samples[i]);
   }
 }
 
@@ -39,26 +49,28 @@ bool GyroRate::Evaluate(double const* const* parameters, double* residuals,
     Eigen::Map<Eigen::VectorXd>(residuals, 3 * n) +=
         E * Eigen::Map<const Eigen::VectorXd>(parameters[2], E.cols());
   }
-  r = inv_sigma_.asDiagonal() * r;
+  r.array() *= inv_sigma_.array();
   if (jacobians == nullptr) return true;
   if (jacobians[0] != nullptr) {
     Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J(
         jacobians[0], 3 * n, 3 * n);
-    J = inv_sigma_.replicate(n, 1).asDiagonal();
+    J = inv_sigma_.reshaped().asDiagonal();
     if (effects_) {
-      const Eigen::Matrix3d by_rate = inv_sigma_.asDiagonal() * effects_->RateByRate(parameters[2]);
-      for (Eigen::Index i = 0; i < n; ++i) J.block<3, 3>(3 * i, 3 * i) += by_rate;
+      const Eigen::Matrix3d by_rate = effects_->RateByRate(parameters[2]);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        J.block<3, 3>(3 * i, 3 * i) += inv_sigma_.col(i).asDiagonal() * by_rate;
+      }
     }
   }
   if (jacobians[1] != nullptr) {
     Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>> J(jacobians[1], 3 * n, 3);
     for (Eigen::Index i = 0; i < n; ++i) {
-      J.middleRows<3>(3 * i) = inv_sigma_.asDiagonal();
+      J.middleRows<3>(3 * i) = inv_sigma_.col(i).asDiagonal();
     }
   }
   if (effects_ && jacobians[2] != nullptr) {
     Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-        jacobians[2], 3 * n, E.cols()) = inv_sigma_.replicate(n, 1).asDiagonal() * E;
+        jacobians[2], 3 * n, E.cols()) = inv_sigma_.reshaped().asDiagonal() * E;
   }
   return true;
 }

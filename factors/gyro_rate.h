@@ -27,13 +27,16 @@ class GyroRate final : public ceres::CostFunction {
   // effects: null, or with parameters; then times_s are those of the readings.
   GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const Eigen::Vector3d& sigma_rad_s,
            std::shared_ptr<const EffectSet> effects = nullptr, std::vector<double> times_s = {});
+  // Readings that are means of some samples; sigma: of one sample.
+  GyroRate(const Eigen::Matrix3Xd& measured_rad_s, const std::vector<int>& samples,
+           const Eigen::Vector3d& sigma_rad_s);
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
   const Eigen::Matrix3Xd measured_;
-  const Eigen::Vector3d inv_sigma_;
+  Eigen::Matrix3Xd inv_sigma_;  // of each reading
   const std::shared_ptr<const EffectSet> effects_;
   const std::vector<double> times_s_;
 };

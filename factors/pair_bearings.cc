@@ -1,5 +1,7 @@
 #include "factors/pair_bearings.h"
 
+#include <algorithm>
+
 #include "factors/rotation_manifold.h"
 
 namespace camgyro {
@@ -41,6 +43,21 @@ Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* 
   return rates;
 }
 
+Eigen::Matrix3Xd GatherRates(const PairMeasurement& pair, const double* const* groups) {
+  if (pair.rate_step == 1 && pair.rate_base.cols() == 0) {
+    return GatherRates(pair.rate_group_sizes, groups);
+  }
+  Eigen::Matrix3Xd rates = pair.rate_base;
+  int column = 0;
+  for (size_t g = 0; g < pair.rate_group_sizes.size(); ++g) {
+    const Eigen::Map<const Eigen::Matrix3Xd> values(groups[g], 3, pair.num_rate_values(g));
+    for (int i = 0; i < pair.rate_group_sizes[g]; ++i) {
+      rates.col(column++) += values.col(i / pair.rate_step);
+    }
+  }
+  return rates;
+}
+
 void PairRow::Write(int row, double scale, const double* q_gyro_cam, const PairMeasurement& pair,
                     int first_rate_group, double** jacobians) const {
   if (jacobians[0] != nullptr) {
@@ -65,8 +82,12 @@ void PairRow::Write(int row, double scale, const double* q_gyro_cam, const PairM
   for (size_t g = 0; g < group_sizes.size(); ++g) {
     double* jacobian = jacobians[static_cast<size_t>(first_rate_group) + g];
     if (jacobian != nullptr) {
-      Eigen::Map<Eigen::Matrix3Xd>(jacobian + row * 3 * group_sizes[g], 3, group_sizes[g]) =
-          scale * by_rates_.middleCols(column, group_sizes[g]);
+      const int values = pair.num_rate_values(g);
+      Eigen::Map<Eigen::Matrix3Xd> J(jacobian + row * 3 * values, 3, values);
+      for (int k = 0, first = 0; k < values; ++k, first += pair.rate_step) {
+        const int count = std::min(pair.rate_step, group_sizes[g] - first);
+        J.col(k) = scale * by_rates_.middleCols(column + first, count).rowwise().sum();
+      }
     }
     column += group_sizes[g];
   }

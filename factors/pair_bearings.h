@@ -23,10 +23,18 @@ struct PairMeasurement {
   const Lens* lens = nullptr;
   std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
 
-  // Rates that the pair needs: their times, strictly increasing, split into consecutive parameter
-  // blocks of these sizes (in samples).
+  // Rates that the pair needs: their times, strictly increasing, split into consecutive groups of
+  // these sizes (in samples), each with a parameter block. A parameter is the rate of a sample, or
+  // with a step > 1 a correction of the rates rate_base of that many samples of the group in a row:
+  // noise that is white over some 15 ms turns nothing that a pixel could see.
   std::vector<double> rate_times_s;
   std::vector<int> rate_group_sizes;
+  int rate_step = 1;
+  Eigen::Matrix3Xd rate_base;  // 3 x samples; empty: zero
+
+  int num_rate_values(size_t group) const {
+    return (rate_group_sizes[group] + rate_step - 1) / rate_step;
+  }
 
   double variance_a() const { return noise == MatchNoise::kBothImages ? sigma_px * sigma_px : 0.0; }
   double variance_b() const { return sigma_px * sigma_px; }
@@ -34,7 +42,7 @@ struct PairMeasurement {
 
 // Order of the parameter blocks of the coplanarity factors:
 //   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>), turn 3,]
-//   [effects, if the pair has any,] rate groups
+//   [effects, if the pair has any,] rate groups, 3 * num_rate_values each
 // q_gyro_cam is stored [x y z w].
 inline int NumEffectBlocks(const PairMeasurement& pair) { return pair.effects ? 1 : 0; }
 
@@ -49,7 +57,9 @@ struct PairBearings {
                                         const double* q_gyro_cam, const double* effects,
                                         bool derivatives, PairBearings* bearings);
 
-// The rates of all groups as columns.
+// The rates of a pair's samples as columns.
+Eigen::Matrix3Xd GatherRates(const PairMeasurement& pair, const double* const* groups);
+// Of groups whose parameters are the rates themselves.
 Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* const* groups);
 
 // One row of a residual's Jacobian, before it is written to Ceres' blocks.
@@ -68,8 +78,6 @@ class PairRow {
   }
   const PairGradient& gradient() const { return gradient_; }
   const Eigen::Matrix3Xd& by_rates() const { return by_rates_; }
-  // Adds a derivative by the readout time that does not come through a bearing.
-  void AddReadout(double by_readout) { gradient_.by_shutter[kReadout] += by_readout; }
   // Writes the row, times `scale`, to the Jacobians of lens, shutter, rotation, effects and rate
   // groups. Entries of `jacobians` may be null (constant blocks). first_rate_group: index of that
   // block; the effects, if the pair has any, come before it.

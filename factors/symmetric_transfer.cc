@@ -67,15 +67,15 @@ SymmetricTransfer::SymmetricTransfer(std::shared_ptr<const PairMeasurement> pair
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   set_num_residuals(kResidualsPerMatch * static_cast<int>(pair_->matches.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4};
-  for (const int size : pair_->rate_group_sizes) {
-    mutable_parameter_block_sizes()->push_back(3 * size);
+  for (size_t g = 0; g < pair_->rate_group_sizes.size(); ++g) {
+    mutable_parameter_block_sizes()->push_back(3 * pair_->num_rate_values(g));
   }
 }
 
 bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residuals,
                                  double** jacobians) const {
   const PairMeasurement& pair = *pair_;
-  const Eigen::Matrix3Xd rates = GatherRates(pair.rate_group_sizes, parameters + kFirstRateGroup);
+  const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + kFirstRateGroup);
   const RotationChain chain(pair.rate_times_s, rates);
   const LensParameters lens = Eigen::Map<const LensParameters>(parameters[0]);
   PairBearings bearings;

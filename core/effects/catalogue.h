@@ -51,7 +51,7 @@ class EffectSet {
   // The lens block with the effects that are a constant part of it.
   LensParameters ConstantLens(const LensParameters& lens, const Eigen::VectorXd& values) const;
   // The largest that an effect asks for; 0: none does.
-  double turn_sigma_rad() const;
+  double turn_sigma_rad_s() const;
 
  private:
   std::vector<Item> items_;

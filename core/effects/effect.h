@@ -76,8 +76,8 @@ class Effect {
   virtual bool is_constant_lens() const { return false; }
   // Made from a calibration so exactly that it is to be made anew when that has moved.
   virtual bool depends_on_calibration() const { return false; }
-  // Prior of the translation direction's turn that this effect needs [rad]; 0: as it is.
-  virtual double turn_sigma_rad() const { return 0.0; }
+  // Prior of the translation direction's turn that this effect needs [rad/s]; 0: as it is.
+  virtual double turn_sigma_rad_s() const { return 0.0; }
 
  private:
   const std::vector<EffectParameter> parameters_;

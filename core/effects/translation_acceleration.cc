@@ -10,7 +10,7 @@ namespace {
 class TranslationAcceleration final : public Effect {
  public:
   explicit TranslationAcceleration(const EffectSetup&) : Effect({}) {}
-  double turn_sigma_rad() const override { return 0.6; }
+  double turn_sigma_rad_s() const override { return 20.0; }
 };
 
 }  // namespace

@@ -96,7 +96,7 @@ class Loop {
       : in_(in),
         options_(options),
         progress_(progress),
-        input_(MakeEstimationInput(*in.recording)),
+        input_(MakeEstimationInput(*in.recording, SelectPairs(*in.recording, kLongestGap))),
         shares_(MakeShares(*in.recording, input_)) {
     Thin(kMostFitPairs, &shares_.fit);
     Thin(kMostChoicePairs, &shares_.choice);
@@ -156,6 +156,7 @@ class Loop {
  private:
   // Of recordings with pixels. A fit needs no more to tell effects apart: what it gets wrong within
   // its noise is projected out of the test. Time is spent on the refits.
+  static constexpr int kLongestGap = 3;  // what comes and goes within frames is to be seen
   static constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
   static constexpr double kAliasLimit = 0.95;
   static constexpr double kStrongMisfit = 0.02;  // gain of one effect over chi2
@@ -218,7 +219,7 @@ class Loop {
       }
       for (const std::string& shape : entry.shapes(setup)) {
         std::shared_ptr<const Effect> effect = entry.make(setup, shape);
-        if (effect == nullptr || effect->turn_sigma_rad() > 0.0) continue;
+        if (effect == nullptr || effect->turn_sigma_rad_s() > 0.0) continue;
         if (present && static_cast<size_t>(effect->size()) <= present_size) continue;
         candidates.push_back({&entry, shape, std::move(effect), 0});
       }
@@ -389,7 +390,7 @@ class Loop {
       const bool in_any_case = astray && r.name == "radial_distortion";
       if (in_any_case) r.rejected.clear();
       if (!r.rejected.empty()) continue;
-      if (candidate.effect->turn_sigma_rad() > 0.0) {
+      if (candidate.effect->turn_sigma_rad_s() > 0.0) {
         // It frees three numbers per pair, whose gain the likelihood ratio has discounted: that one
         // stands, not the fall of chi2.
         Calibration turned = fit_.calibration;
@@ -457,7 +458,7 @@ class Loop {
     if (rivals.empty()) return false;
     const auto gain_of = [&](const Rival& rival) { return (*all)[rival.at].first.gain.sum; };
     const auto size_of = [&](const Rival& rival) {
-      const bool turn = (*all)[rival.at].second.effect->turn_sigma_rad() > 0.0;
+      const bool turn = (*all)[rival.at].second.effect->turn_sigma_rad_s() > 0.0;
       return turn ? 1000 : (*all)[rival.at].first.parameters;
     };
     size_t winner = 0;

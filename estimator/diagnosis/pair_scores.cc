@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/window/direction_search.h"
 #include "estimator/window/pair_view.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/relative_rotation.h"
@@ -15,7 +14,7 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double kFreeTurnRad = 0.6;
+constexpr double kFreeTurnRadS = 20.0;  // as translation_acceleration
 
 // The model's effects and the candidates side by side; candidates at zero.
 struct AllEffects {
@@ -77,8 +76,10 @@ Eigen::MatrixXd RateColumnsOf(const AllEffects& all, const std::vector<double>& 
 struct PairSystem {
   Eigen::VectorXd r;
   Eigen::MatrixXd J, N;
-  Eigen::VectorXd prior;  // of N's columns, 1 / sigma^2
-  int turn_column = -1;   // of N; -1: none
+  Eigen::VectorXd prior;   // of N's columns, 1 / sigma^2, around zero
+  Eigen::VectorXd at;      // where they are
+  int turn_column = -1;    // of N; -1: none
+  double free_turn = 0.0;  // 1 / sigma^2 of a turn that is free
 };
 
 void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore* block) {
@@ -87,7 +88,7 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   A.diagonal().array() += 1e-9;
   const Eigen::LDLT<Eigen::MatrixXd> solver(A);
   const Eigen::MatrixXd NJ = s.N.transpose() * s.J;
-  const Eigen::VectorXd Nr = s.N.transpose() * s.r;
+  const Eigen::VectorXd Nr = s.N.transpose() * s.r + s.prior.cwiseProduct(s.at);
   const Eigen::MatrixXd X = solver.solve(NJ);
   const Eigen::VectorXd x = solver.solve(Nr);
   const Eigen::VectorXd g = s.J.transpose() * s.r - NJ.transpose() * x;
@@ -95,7 +96,7 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   H.selfadjointView<Eigen::Lower>().rankUpdate(s.J.transpose());
   H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
   H.noalias() -= NJ.transpose() * X;
-  pair->chi2 = s.r.squaredNorm() - Nr.dot(x);
+  pair->chi2 = s.r.squaredNorm() + s.at.dot(s.prior.cwiseProduct(s.at)) - Nr.dot(x);
   pair->g = g;
   pair->H = H.topLeftCorner(num_model, num_model);
   block->g += g;
@@ -109,7 +110,7 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   // score and W its information, 2 log L(s) = u (W + s^-2)^-1 u - log det(1 + s^2 W).
   const Eigen::Index at = s.turn_column, n = s.N.cols();
   Eigen::VectorXd wide = s.prior;
-  wide.segment<3>(at).setConstant(1.0 / (kFreeTurnRad * kFreeTurnRad));
+  wide.segment<3>(at).setConstant(s.free_turn);
   const auto two_log = [&](const Eigen::VectorXd& prior) {
     Eigen::MatrixXd B = s.N.transpose() * s.N;
     B.diagonal() += prior;
@@ -117,7 +118,9 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
     const Eigen::LDLT<Eigen::MatrixXd> factor(B);
     double log_det = 0.0;
     for (Eigen::Index i = 0; i < n; ++i) log_det += std::log(factor.vectorD()[i]);
-    return Nr.dot(factor.solve(Nr)) - log_det + prior.segment<3>(at).array().log().sum();
+    const Eigen::VectorXd b = s.N.transpose() * s.r + prior.cwiseProduct(s.at);
+    return b.dot(factor.solve(b)) - s.at.dot(prior.cwiseProduct(s.at)) - log_det +
+           prior.segment<3>(at).array().log().sum();
   };
   pair->turn_gain = two_log(wide) - two_log(s.prior);
 }
@@ -130,17 +133,14 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
       static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches) {
     return false;
   }
-  const DirectionEstimate direction =
-      FindDirection(view.bearings, view.measurement.variance_a(), view.measurement.variance_b(),
-                    options.robust_threshold);
+  const PairPlane plane = FitPlane(view);
   auto measurement = std::make_shared<PairMeasurement>(view.measurement);
   measurement->effects = all.set->size() > 0 ? all.set : nullptr;
   const CoplanarityPlane cost(measurement);
   const ShutterParameters shutter(c.delay_s, c.readout_s);
-  const Eigen::Vector3d turn = Eigen::Vector3d::Zero();
   std::vector<const double*> parameters = {c.lens.data(), shutter.data(),
-                                           c.q_gyro_cam.coeffs().data(), direction.tau.data(),
-                                           turn.data()};
+                                           c.q_gyro_cam.coeffs().data(), plane.tau.data(),
+                                           plane.turn.data()};
   if (measurement->effects) parameters.push_back(all.values.data());
   parameters.push_back(view.rates.data());
   const Evaluated e = Evaluate(cost, parameters);
@@ -162,17 +162,34 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
   s->J.rightCols(all.set->size()) = -through_rates.rightCols(all.set->size());
   if (measurement->effects) s->J.rightCols(all.set->size()) += e.J[CoplanarityPlane::kEffectsBlock];
 
-  const Eigen::Vector3d u = direction.tau.unitOrthogonal(), v = direction.tau.cross(u);
-  s->N.resize(e.r.size(), 5 + by_rates.cols());
+  const Eigen::Vector3d u = plane.tau.unitOrthogonal(), v = plane.tau.cross(u);
+  // The noise of the rates as PairGraph has it: its means over some samples.
+  const Eigen::Index samples = view.rates.cols();
+  const double interval_s =
+      (measurement->rate_times_s.back() - measurement->rate_times_s.front()) / (samples - 1.0);
+  const Eigen::Index step =
+      std::max<Eigen::Index>(1, std::lround(options.rate_step_s / interval_s));
+  const Eigen::Index values = (samples + step - 1) / step;
+  s->N.setZero(e.r.size(), 5 + 3 * values);
   s->N.col(0) = e.J[CoplanarityPlane::kTauBlock] * u;
   s->N.col(1) = e.J[CoplanarityPlane::kTauBlock] * v;
   s->N.middleCols<3>(2) = e.J[CoplanarityPlane::kTurnBlock];
-  s->N.rightCols(by_rates.cols()) = by_rates;
-  const double turn_sigma = std::max(options.turn_sigma_rad, all.set->turn_sigma_rad());
+  Eigen::VectorXd rate_prior(3 * values);
+  for (Eigen::Index k = 0; k < values; ++k) {
+    const Eigen::Index count = std::min(step, samples - k * step);
+    for (Eigen::Index i = k * step; i < k * step + count; ++i) {
+      s->N.middleCols<3>(5 + 3 * k) += by_rates.middleCols<3>(3 * i);
+    }
+    rate_prior.segment<3>(3 * k) =
+        static_cast<double>(count) * options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse();
+  }
   s->prior.setZero(s->N.cols());
-  s->prior.segment<3>(2).setConstant(1.0 / (turn_sigma * turn_sigma));
-  s->prior.tail(by_rates.cols()) =
-      options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse().replicate(view.rates.cols(), 1);
+  s->prior.segment<3>(2).setConstant(1.0 / (view.turn_sigma_rad * view.turn_sigma_rad));
+  const double free_turn = TurnSigma(kFreeTurnRadS, c.readout_s);
+  s->free_turn = 1.0 / (free_turn * free_turn);
+  s->prior.tail(3 * values) = rate_prior;
+  s->at = Eigen::VectorXd::Zero(s->N.cols());
+  s->at.segment<3>(2) = plane.turn;
   s->turn_column = 2;
   return true;
 }
@@ -211,6 +228,7 @@ bool RotationSystem(const EstimationInput& input, const TimedPair& pair, const C
   if (m->effects) s->J.rightCols(all.set->size()) += e.J[RelativeRotation::kEffectsBlock];
   s->N = by_rates;
   s->prior = options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse().replicate(rates.cols(), 1);
+  s->at = Eigen::VectorXd::Zero(s->N.cols());
   s->turn_column = -1;
   return true;
 }

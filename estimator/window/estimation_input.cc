@@ -9,7 +9,42 @@
 
 namespace camgyro {
 
-EstimationInput MakeEstimationInput(const Recording& recording) {
+PairSelection SelectPairs(const Recording& recording, int longest_gap, int least_pairs) {
+  constexpr double kLongestS = 0.2;
+  constexpr double kLeastMatches = 0.6;  // of the neighbours'
+  PairSelection selection;
+  if (!recording.matches.empty() || recording.tracks.empty()) return selection;
+  const auto matches = [&](int gap) {
+    size_t count = 0;
+    for (const FramePair& pair : PairsFromTracks(recording.tracks, gap)) {
+      count += pair.matches.size();
+    }
+    return static_cast<double>(count);
+  };
+  const bool independent = recording.match_noise == MatchNoise::kBothImages;
+  const double interval_s = MedianInterval(recording.frames);
+  const int frames = static_cast<int>(recording.tracks.size());
+  const double neighbours = matches(1);
+  for (int gap = independent ? 3 : 2; gap <= longest_gap; gap += independent ? 2 : 1) {
+    const int stride = independent ? 2 : gap;
+    if (gap * interval_s > kLongestS || frames < least_pairs * stride + gap ||
+        matches(gap) < kLeastMatches * neighbours) {
+      break;
+    }
+    selection = {gap, stride};
+  }
+  return selection;
+}
+
+std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs) {
+  std::vector<TimedPair> kept;
+  for (const TimedPair& pair : pairs) {
+    if (kept.empty() || pair.time_a_s >= kept.back().time_b_s) kept.push_back(pair);
+  }
+  return kept;
+}
+
+EstimationInput MakeEstimationInput(const Recording& recording, const PairSelection& selection) {
   EstimationInput input;
   input.origin_ns = recording.gyro.front().stamp_ns;
   const std::vector<bool> saturated = FindSaturated(recording.gyro);
@@ -32,9 +67,13 @@ EstimationInput MakeEstimationInput(const Recording& recording) {
     return input.pairs.back();
   };
   if (!recording.matches.empty() || !recording.tracks.empty()) {
+    const bool tracked = recording.matches.empty();
     const std::vector<FramePair> pairs =
-        recording.matches.empty() ? PairsFromTracks(recording.tracks, 1) : recording.matches;
-    for (const FramePair& pair : pairs) add(pair.frame_a, pair.frame_b).matches = pair.matches;
+        tracked ? PairsFromTracks(recording.tracks, selection.gap) : recording.matches;
+    for (const FramePair& pair : pairs) {
+      if (tracked && pair.frame_a % selection.stride != 0) continue;
+      add(pair.frame_a, pair.frame_b).matches = pair.matches;
+    }
   } else {
     const int n = static_cast<int>(recording.q_cam_world.size());
     for (int a = 0; a + 1 < n; ++a) {

@@ -31,9 +31,29 @@ struct EstimationInput {
   std::vector<TimedPair> pairs;
 };
 
-// Pairs of neighbouring frames from matches, tracks or attitudes. (Attitudes further apart move the
-// delay: tablet-attitude D03 by 1 ms for each frame.) What is absent gives no pairs.
-EstimationInput MakeEstimationInput(const Recording& recording);
+// Which frames of tracks make a pair: a and a + gap, for every stride-th a.
+struct PairSelection {
+  int gap = 1;
+  int stride = 1;
+};
+
+// The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
+// observation does not, so that neighbours tell least, and are biased where their parallax is as
+// small as the noise (docs/benchmark.md). The gap is the longest up to 0.2 s that keeps 60 % of the
+// neighbours' matches and leaves `least_pairs`. No two pairs share noise: where each observation
+// has its own error, gaps are odd and pairs begin at even frames, so that every observation is in
+// one pair; where a tracker re-anchors (MatchNoise::kSecondImage), a pair begins where the one
+// before ends. Without tracks: neighbours.
+PairSelection SelectPairs(const Recording& recording, int longest_gap = 10, int least_pairs = 100);
+
+// Pairs from matches, tracks (which of them: `selection`) or attitudes. Matches come in the pairs
+// that the file has. Attitudes are taken of neighbours. (Further apart they move the delay:
+// tablet-attitude D03 by 1 ms for each frame.) What is absent gives no pairs.
+EstimationInput MakeEstimationInput(const Recording& recording,
+                                    const PairSelection& selection = {});
+
+// Pairs of which none begins before the one before ends, for estimators that go along.
+std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs);
 
 // What effects may know of a recording, with what a calibration says of it so far.
 EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration);

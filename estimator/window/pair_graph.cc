@@ -8,6 +8,7 @@
 
 #include "core/so3.h"
 #include "estimator/window/direction_search.h"
+#include "estimator/window/pair_view.h"
 #include "factors/bias_walk.h"
 #include "factors/coplanarity_determinant.h"
 #include "factors/coplanarity_plane.h"
@@ -72,11 +73,10 @@ PairGraph::PairGraph(const Calibration& start, const Calibration& prior_mean,
   prior_mean_.prior_sigma = sigma;
   prior_mean_.effects = start.effects;
   start_bias_ = start.bias_gyro_rad_s;
-  double turn_sigma = options_.turn_sigma_rad;
-  if (start.effects) turn_sigma = std::max(turn_sigma, start.effects->turn_sigma_rad());
-  turn_prior_ = std::make_shared<MarginalPrior>(
-      std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(3), false}},
-      Eigen::MatrixXd::Identity(3, 3) / turn_sigma, Eigen::VectorXd::Zero(3));
+  turn_sigma_rad_s_ = options_.turn_sigma_rad_s;
+  if (start.effects) {
+    turn_sigma_rad_s_ = std::max(turn_sigma_rad_s_, start.effects->turn_sigma_rad_s());
+  }
   if (const auto effects = Effects()) {
     num_effects_ = effects->size();
     CHECK_EQ(start.effect_values.size(), num_effects_);
@@ -140,9 +140,33 @@ void PairGraph::AddBias(int64_t index) {
   }
 }
 
-AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, std::vector<int64_t>* groups,
-                                        std::vector<double>* times, std::vector<int>* sizes) {
-  if (samples_.size() < 3 || samples_.back().time_s < to_s) return AddPairResult::kGyroTooLate;
+Eigen::Vector3d PairGraph::ChainRateOf(int64_t number) const {
+  const TimedRate& now = sample(number);
+  if (number == first_sample_ ||
+      number + 1 == first_sample_ + static_cast<int64_t>(samples_.size())) {
+    return now.omega_gyro_rad_s;
+  }
+  const TimedRate &before = sample(number - 1), &after = sample(number + 1);
+  return ChainRate(before.omega_gyro_rad_s, now.omega_gyro_rad_s, after.omega_gyro_rad_s,
+                   now.time_s - before.time_s, after.time_s - now.time_s);
+}
+
+int PairGraph::RateStep() const {
+  if (num_effects_ > 0) {
+    for (const auto& item : prior_mean_.effects->items()) {
+      if (item.entry->part == ModelPart::kRate) return 1;
+    }
+  }
+  return std::max(1, static_cast<int>(std::lround(options_.rate_step_s / median_interval_s_)));
+}
+
+AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, int step,
+                                        std::vector<int64_t>* groups, std::vector<double>* times,
+                                        std::vector<int>* sizes) {
+  // One sample beyond, for the rate at the last one.
+  if (samples_.size() < 3 || samples_[samples_.size() - 2].time_s < to_s) {
+    return AddPairResult::kGyroTooLate;
+  }
   if (samples_.front().time_s > from_s) return AddPairResult::kGyroTooEarly;
   const auto by_time = [](const TimedRate& rate, double t) { return rate.time_s < t; };
   // First needed: the last sample not after from_s; last needed: the first not before to_s.
@@ -178,13 +202,13 @@ AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, std::vector<
     AddBias(group.bias_index);
     Eigen::Matrix3Xd measured(3, group.count);
     for (int i = 0; i < group.count; ++i) {
-      measured.col(i) = sample(covered_until + i).omega_gyro_rad_s;
+      measured.col(i) = ChainRateOf(covered_until + i);
     }
     const Eigen::Vector3d bias = graph_.value(BiasBlock(group.bias_index));
     Eigen::Matrix3Xd rates = measured.colwise() - bias;
     std::vector<double> group_times;
     std::vector<BlockId> rate_blocks = {RatesBlock(next_group_), BiasBlock(group.bias_index)};
-    if (num_effects_ > 0) {
+    if (num_effects_ > 0 && step == 1) {
       rate_blocks.push_back(kEffectsBlock);
       for (int i = 0; i < group.count; ++i) {
         group_times.push_back(sample(covered_until + i).time_s);
@@ -192,12 +216,28 @@ AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, std::vector<
       }
     }
     const int64_t id = next_group_++;
-    graph_.AddBlock(
-        RatesBlock(id),
-        {Geometry::kEuclidean, Eigen::Map<const Eigen::VectorXd>(rates.data(), rates.size()), {}});
-    group.factor = graph_.AddFactor(std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s,
-                                                               Effects(), std::move(group_times)),
-                                    std::move(rate_blocks));
+    if (step > 1) {
+      // Corrections x of rates less the bias of now: x + bias - bias of now is noise.
+      std::vector<int> samples;
+      for (int i = 0; i < group.count; i += step)
+        samples.push_back(std::min(step, group.count - i));
+      const auto values = static_cast<Eigen::Index>(samples.size());
+      group.base = rates;
+      graph_.AddBlock(RatesBlock(id),
+                      {Geometry::kEuclidean, Eigen::VectorXd::Zero(3 * values), {}});
+      group.factor = graph_.AddFactor(
+          std::make_shared<GyroRate>(bias.replicate(1, values), samples, options_.gyro_sigma_rad_s),
+          {RatesBlock(id), BiasBlock(group.bias_index)});
+    } else {
+      graph_.AddBlock(RatesBlock(id),
+                      {Geometry::kEuclidean,
+                       Eigen::Map<const Eigen::VectorXd>(rates.data(), rates.size()),
+                       {}});
+      group.factor =
+          graph_.AddFactor(std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s,
+                                                      Effects(), std::move(group_times)),
+                           std::move(rate_blocks));
+    }
     groups_.emplace(id, group);
     groups->push_back(id);
   }
@@ -228,9 +268,19 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   if (static_cast<int>(m.matches.size()) < kMinMatches) return AddPairResult::kTooFewMatches;
   const auto [first, last] = Exposures(frame_a, frame_b);
   const AddPairResult covered =
-      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, &pair.groups,
-                     &m.rate_times_s, &m.rate_group_sizes);
+      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, RateStep(),
+                     &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
   if (covered != AddPairResult::kAdded) return covered;
+  m.rate_step = RateStep();
+  if (m.rate_step > 1) {
+    m.rate_base.resize(3, static_cast<Eigen::Index>(m.rate_times_s.size()));
+    Eigen::Index column = 0;
+    for (const int64_t group : pair.groups) {
+      const Eigen::Matrix3Xd& base = groups_.at(group).base;
+      m.rate_base.middleCols(column, base.cols()) = base;
+      column += base.cols();
+    }
+  }
   m.frame_a = frame_a;
   m.frame_b = frame_b;
   m.size_px << prior_mean_.width_px, prior_mean_.height_px;
@@ -245,7 +295,11 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
     blocks.push_back(DirectionBlock(id));
     graph_.AddBlock(TurnBlock(id), {Geometry::kEuclidean, Eigen::Vector3d::Zero(), {}});
     blocks.push_back(TurnBlock(id));
-    graph_.AddFactor(turn_prior_, {TurnBlock(id)});
+    const double turn_sigma = TurnSigma(turn_sigma_rad_s_, graph_.value(kShutterBlock)[kReadout]);
+    graph_.AddFactor(std::make_shared<MarginalPrior>(
+                         std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(3), false}},
+                         Eigen::MatrixXd::Identity(3, 3) / turn_sigma, Eigen::VectorXd::Zero(3)),
+                     {TurnBlock(id)});
   }
   if (num_effects_ > 0) blocks.push_back(kEffectsBlock);
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
@@ -272,8 +326,8 @@ AddPairResult PairGraph::AddRotation(int64_t id, const FrameTime& frame_a, const
   RelativeRotation::Measurement& m = *pair.rotation;
   const auto [first, last] = Exposures(frame_a, frame_b);
   const AddPairResult covered =
-      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, &pair.groups,
-                     &m.rate_times_s, &m.rate_group_sizes);
+      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, /*step=*/1,
+                     &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
   if (covered != AddPairResult::kAdded) return covered;
   m.q_a_b = q_a_b;
   m.frame_a = frame_a;
@@ -357,8 +411,7 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const PairMeasurement& m = *pair.measurement;
   std::vector<const double*> groups;
   for (const int64_t group : pair.groups) groups.push_back(graph_.value(RatesBlock(group)).data());
-  const RotationChain chain(m.rate_times_s, GatherRates(m.rate_group_sizes, groups.data()));
-  const double readout = graph_.value(kShutterBlock)[kReadout];
+  const RotationChain chain(m.rate_times_s, GatherRates(m, groups.data()));
   PairBearings bearings;
   if (!EvaluatePairBearings(m, chain, graph_.value(kLensBlock).data(),
                             graph_.value(kShutterBlock).data(), graph_.value(kRotationBlock).data(),
@@ -371,7 +424,7 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const Eigen::Vector3d tau = graph_.value(DirectionBlock(id)), turn = graph_.value(TurnBlock(id));
   double cost = 0.0;
   for (size_t i = 0; i < m.matches.size(); ++i) {
-    const double share = readout * CoplanarityPlane::RowShare(m, m.matches[i]);
+    const double share = CoplanarityPlane::RowShare(m, m.matches[i]);
     residuals.push_back(EvaluatePlaneResidual(bearings.a[i].ray_ref, bearings.a[i].J_ray_px,
                                               bearings.b[i].ray_ref, bearings.b[i].J_ray_px,
                                               tau + share * turn, m.variance_a(), m.variance_b())

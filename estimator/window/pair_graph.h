@@ -26,8 +26,8 @@ struct PairGraphOptions {
   MatchNoise match_noise = MatchNoise::kBothImages;
   double sigma_px = 1.0;          // of the pairs added from now on
   double robust_threshold = 2.5;  // in sigmas; 0: none
-  // Prior of the bend of the path: change of the translation direction over one pair [rad].
-  double turn_sigma_rad = 0.05;
+  // Prior of the bend of the path: how fast the direction of motion changes [rad/s].
+  double turn_sigma_rad_s = 4.0;
   // White noise of one gyro sample per axis (Jia & Evans section V.C); see GyroSigma.
   Eigen::Vector3d gyro_sigma_rad_s = Eigen::Vector3d::Constant(0.003);
   double bias_walk_rad_s2_rtHz = 1e-4;
@@ -35,6 +35,9 @@ struct PairGraphOptions {
   // Samples kept on both sides of a pair, so that delay and readout can move in a solve. Beyond,
   // rates are held.
   double rate_margin_s = 0.004;
+  // Noise of the gyro is estimated as its mean over so long; one value per sample where effects
+  // change the rates.
+  double rate_step_s = 0.015;
 };
 
 // One gyro sample of the graph's clock: seconds from the graph's origin.
@@ -102,6 +105,7 @@ class PairGraph {
     int count = 0;
     int64_t bias_index = 0;
     FactorGraph::FactorKey factor = 0;
+    Eigen::Matrix3Xd base;  // see PairMeasurement::rate_base; empty with a step of 1
   };
   struct Pair {
     // Shared with the factor, which reads the noise at every evaluation. One of the two is null.
@@ -120,18 +124,22 @@ class PairGraph {
   // First and last exposure of a pair with the present estimate [s].
   std::pair<double, double> Exposures(const FrameTime& frame_a, const FrameTime& frame_b) const;
   // Makes the rate groups that cover [from_s, to_s] on the gyro clock; fills their ids.
-  AddPairResult CoverWithRates(double from_s, double to_s, std::vector<int64_t>* groups,
+  AddPairResult CoverWithRates(double from_s, double to_s, int step, std::vector<int64_t>* groups,
                                std::vector<double>* times, std::vector<int>* sizes);
+  // Samples per value of the rates of pairs with pixels.
+  int RateStep() const;
   void AddBias(int64_t index);
   const TimedRate& sample(int64_t number) const {
     return samples_[static_cast<size_t>(number - first_sample_)];
   }
+  // The sample as the rotation chain wants it.
+  Eigen::Vector3d ChainRateOf(int64_t number) const;
 
   PairGraphOptions options_;
   Calibration prior_mean_;
   Eigen::Vector3d start_bias_ = Eigen::Vector3d::Zero();  // value of the first bias block
   FactorGraph graph_;
-  std::shared_ptr<const ceres::CostFunction> turn_prior_;  // one for all pairs
+  double turn_sigma_rad_s_ = 0.0;  // of the options or, if wider, of the effects
   std::deque<TimedRate> samples_;
   int64_t first_sample_ = 0;  // absolute number of samples_.front()
   double median_interval_s_ = 0.0;

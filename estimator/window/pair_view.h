@@ -6,6 +6,7 @@
 
 #include "core/calibration.h"
 #include "estimator/window/estimation_input.h"
+#include "factors/coplanarity_plane.h"
 #include "factors/pair_bearings.h"
 
 namespace camgyro {
@@ -14,6 +15,16 @@ struct PairView {
   PairMeasurement measurement;  // those matches that have rays; rates in one group
   Eigen::Matrix3Xd rates;       // readings less bias and effects [rad/s]
   PairBearings bearings;        // with derivatives
+  double turn_sigma_rad = 0.0;  // prior of the turn
+};
+
+// Spread of the change of direction over the rows, given that of its change in time.
+double TurnSigma(double turn_sigma_rad_s, double readout_s);
+
+// The translation direction of a pair and its turn; see CoplanarityPlane.
+struct PairPlane {
+  Eigen::Vector3d tau = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
 };
 
 // False where the gyro's samples do not cover the pair. noise: pixels. Shutter, lens, effects and
@@ -21,6 +32,12 @@ struct PairView {
 [[nodiscard]] bool ViewPair(const EstimationInput& input, const TimedPair& pair,
                             const Calibration& calibration, double noise_px,
                             const PairGraphOptions& options, PairView* view);
+
+// The plane that fits the matches first, first + step, ... of a view best: the direction searched,
+// the turn with its prior.
+PairPlane FitPlane(const PairView& view, size_t first = 0, size_t step = 1);
+// Of match i, in sigmas, without loss.
+PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i);
 
 // The samples that a pair needs, and one beyond on both sides; false where there are none, or a
 // gap is longer than 5 median intervals and 30 ms.

@@ -5,9 +5,7 @@
 #include <memory>
 
 #include "core/robust_statistics.h"
-#include "estimator/window/direction_search.h"
 #include "estimator/window/pair_view.h"
-#include "factors/coplanarity_plane.h"
 #include "factors/robust.h"
 
 namespace camgyro {
@@ -138,23 +136,12 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
   PairView view;
   for (const TimedPair& pair : pairs) {
     if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
-    const double variance_a = view.measurement.variance_a();
-    const double variance_b = view.measurement.variance_b();
-    std::array<PairBearings, 2> halves;  // for the direction, and for the residuals
-    for (size_t i = 0; i < view.bearings.a.size(); ++i) {
-      halves[i % 2].a.push_back(view.bearings.a[i]);
-      halves[i % 2].b.push_back(view.bearings.b[i]);
-    }
-    if (halves[0].a.size() < PairGraph::kMinMatches / 2) continue;
+    if (view.bearings.a.size() < PairGraph::kMinMatches) continue;
     ++fit.pairs;
-    const Eigen::Vector3d tau =
-        FindDirection(halves[0], variance_a, variance_b, options.robust_threshold).tau;
-    for (size_t i = 0; i < halves[1].a.size(); ++i) {
-      const Bearing &a = halves[1].a[i], &b = halves[1].b[i];
-      const double r = EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau,
-                                             variance_a, variance_b)
-                           .value;
-      const double bounded = Robustify(r, options.robust_threshold).value;
+    const PairPlane plane = FitPlane(view, 0, 2);
+    for (size_t i = 1; i < view.bearings.a.size(); i += 2) {
+      const double bounded =
+          Robustify(ResidualOf(view, plane, i).value, options.robust_threshold).value;
       sum_sq += bounded * bounded;
       ++fit.matches;
     }

@@ -21,8 +21,8 @@ struct SlidingWindowOptions {
   // Until then nothing is marginalised, up to this many pairs: a prior that was linearised at a
   // poor estimate stays wrong for ever. The window is then solved
   // every `unsettled_stride` pairs.
-  int unsettled_pairs = 150;
-  int unsettled_stride = 10;
+  int unsettled_pairs = 60;
+  int unsettled_stride = 5;
   // Settled: the standard deviations are below these. Parameters that the motion never determines
   // hold the window open until unsettled_pairs.
   double settled_focal = 0.01;  // of the focal length

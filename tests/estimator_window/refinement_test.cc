@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/time.h"
 #include "tests/estimator_window/simulated_input.h"
@@ -152,6 +153,49 @@ TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
   EXPECT_LT(
       (GyroSigma(s.recording, 0.0) - Eigen::Vector3d::Constant(5e-4 * std::sqrt(200.0))).norm(),
       1e-6);
+}
+
+// No two pairs share noise, whichever kind it is.
+TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
+  simulation::Scenario scenario = ShortScenario(10.0);
+  const Recording recording = SimulateTracks(scenario)->recording;
+  const PairSelection selection = SelectPairs(recording);
+  EXPECT_EQ(selection.gap % 2, 1);
+  EXPECT_EQ(selection.stride, 2);
+  const EstimationInput input = MakeEstimationInput(recording, selection);
+  EXPECT_GE(input.pairs.size(), 100u);
+  size_t matches = 0;
+  std::set<int> seen;
+  for (const TimedPair& pair : input.pairs) {
+    EXPECT_TRUE(seen.insert(pair.frame_a).second && seen.insert(pair.frame_b).second);
+    EXPECT_GE(pair.frame_b - pair.frame_a, 3);
+    matches += pair.matches.size();
+  }
+  EXPECT_GT(static_cast<double>(matches) / static_cast<double>(input.pairs.size()), 30.0);
+
+  Recording reanchored = recording;
+  reanchored.match_noise = MatchNoise::kSecondImage;
+  const PairSelection chain = SelectPairs(reanchored);
+  EXPECT_EQ(chain.gap, 2);
+  EXPECT_EQ(chain.stride, chain.gap);
+  const EstimationInput chained = MakeEstimationInput(reanchored, chain);
+  for (size_t i = 1; i < chained.pairs.size(); ++i) {
+    EXPECT_EQ(chained.pairs[i].frame_a, chained.pairs[i - 1].frame_b);
+  }
+
+  // Too short for 100 pairs, or tracks too short: neighbours.
+  EXPECT_EQ(SelectPairs(SimulateTracks(ShortScenario(3.0))->recording).gap, 1);
+  scenario.tracks.mean_life_frames = 4.0;
+  EXPECT_EQ(SelectPairs(SimulateTracks(scenario)->recording).gap, 1);
+}
+
+TEST(SideBySide, LeavesPairsOutThatOverlap) {
+  const Recording recording = SimulateTracks(ShortScenario(1.0))->recording;
+  const EstimationInput input = MakeEstimationInput(recording, {5, 2});
+  ASSERT_EQ(input.pairs.size(), 13u);
+  const std::vector<TimedPair> pairs = SideBySide(input.pairs);
+  ASSERT_EQ(pairs.size(), 5u);
+  for (size_t i = 0; i < pairs.size(); ++i) EXPECT_EQ(pairs[i].frame_a, 6 * static_cast<int>(i));
 }
 
 }  // namespace

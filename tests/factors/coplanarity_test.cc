@@ -240,5 +240,30 @@ TEST(Robustify, KeepsInliersAndIsContinuousWithItsDerivative) {
   EXPECT_LT(std::abs(Robustify(1e9, 2.0).value), 2.0 * std::sqrt(2.0) + 1e-9);
 }
 
+// Corrections of three samples each: the residuals of rates that are corrected so, and derivatives.
+TEST(CoplanarityPlane, TakesCorrectionsOfSeveralRatesAtOnce) {
+  PairScene s = MakePairScene(11);
+  Disturb(11, &s);
+  PairScene coarse = s;
+  coarse.pair = std::make_shared<PairMeasurement>(*s.pair);
+  coarse.pair->rate_step = 3;
+  coarse.pair->rate_base.resize(3, 16);
+  int column = 0;
+  for (size_t g = 0; g < s.rate_groups.size(); ++g) {
+    const int size = s.pair->rate_group_sizes[g];
+    coarse.rate_groups[g] = 0.02 * Eigen::Matrix3Xd::Random(3, coarse.pair->num_rate_values(g));
+    for (int i = 0; i < size; ++i) {
+      coarse.pair->rate_base.col(column++) =
+          s.rate_groups[g].col(i) - coarse.rate_groups[g].col(i / 3);
+    }
+  }
+  EXPECT_EQ(coarse.pair->num_rate_values(1), 3);  // 7 samples
+  const auto fine = Residuals(CoplanarityPlane(s.pair), s.Parameters());
+  const CoplanarityPlane factor(coarse.pair);
+  const auto same = Residuals(factor, coarse.Parameters());
+  for (size_t i = 0; i < fine.size(); ++i) EXPECT_NEAR(fine[i], same[i], 1e-9);
+  ExpectJacobiansMatchDifferences(factor, coarse.Parameters(), 1e-6);
+}
+
 }  // namespace
 }  // namespace camgyro

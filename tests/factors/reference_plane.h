@@ -101,9 +101,7 @@ T Plane(const PairMeasurement& pair, const Match& match, const T* lens, const T*
         const T* q, const Vec3<T>& tau0, const Vec3<T>& turn, const std::vector<T>& rates) {
   using std::sqrt;
   const T middle_row((match.px_a.y() + match.px_b.y()) / 2);
-  const T from_middle_s = shutter[1] * (middle_row / T(pair.size_px.y()) - T(0.5));
-  const Vec3<T> tau =
-      tau0 + turn * (from_middle_s / T(pair.frame_b.stamp_s - pair.frame_a.stamp_s));
+  const Vec3<T> tau = tau0 + turn * (middle_row / T(pair.size_px.y()) - T(0.5));
   Vec3<T> a, b;
   Mat32<T> A, B;
   RayAndJacobian(pair, lens, shutter, q, rates, match.px_a, pair.frame_a.stamp_s, &a, &A);

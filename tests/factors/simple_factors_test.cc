@@ -33,5 +33,17 @@ TEST(BiasWalk, ResidualIsTheStepInSigmas) {
   ExpectJacobiansMatchDifferences(factor, {b0.data(), b1.data()}, 1e-6);
 }
 
+// A mean of four samples has half the noise.
+TEST(GyroRate, ReadingsMayBeMeansOfSamples) {
+  Eigen::Matrix3Xd rates = Eigen::Matrix3Xd::Zero(3, 2);
+  Eigen::Vector3d bias(0.003, 0.0, 0.0);
+  const GyroRate factor(Eigen::Matrix3Xd::Zero(3, 2), {4, 1}, {0.003, 0.003, 0.003});
+  Eigen::Matrix<double, 6, 1> r;
+  const double* parameters[] = {rates.data(), bias.data()};
+  ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
+  EXPECT_LT((r - (Eigen::Matrix<double, 6, 1>() << 2, 0, 0, 1, 0, 0).finished()).norm(), 1e-10);
+  ExpectJacobiansMatchDifferences(factor, {rates.data(), bias.data()}, 1e-6);
+}
+
 }  // namespace
 }  // namespace camgyro

@@ -61,7 +61,7 @@ std::vector<WindowUpdate> RunWindow(const Input& input, const EstimationInput& d
     }
     return true;
   };
-  for (const TimedPair& pair : data.pairs) {
+  for (const TimedPair& pair : SideBySide(data.pairs)) {
     if (!feed_until(pair.time_b_s + input.start.delay_s)) return {};
     const auto stamp = [&](int frame) {
       return input.recording.frames[static_cast<size_t>(frame)].stamp_ns;
@@ -131,7 +131,7 @@ const std::vector<std::string>& EstimatorNames() {
 
 std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, const Input& input,
                                         const EkfOptions& ekf) {
-  const EstimationInput data = MakeEstimationInput(input.recording);
+  const EstimationInput data = MakeEstimationInput(input.recording, SelectPairs(input.recording));
   std::vector<EstimatorRun> runs;
   // The window's, also for the refinement, which begins where it ends.
   std::optional<EstimatorRun> window;
@@ -148,7 +148,12 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
       Calibration start = input.start;
       start.prior_sigma = input.prior.prior_sigma;
       EkfRun result;
-      Measure([&] { result = RunEkf(data, input.recording.frames, start, ekf); }, &run);
+      Measure(
+          [&] {
+            result =
+                RunEkf(MakeEstimationInput(input.recording), input.recording.frames, start, ekf);
+          },
+          &run);
       TakeTrace(result.trace, input, &run);
     } else if (name == "window") {
       run_window();

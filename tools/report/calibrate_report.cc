@@ -36,7 +36,7 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
       SummarySection(report, attitudes), MotionSection(recording, report, attitudes),
       ConvergenceSection(report), DelaySection(report.start), RatesSection(recording, calibration)};
   if (!attitudes) {
-    const EstimationInput input = MakeEstimationInput(recording);
+    const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
     const std::vector<TimedPair> pairs = Spread(input.pairs);
     PairGraphOptions options;
     options.match_noise = recording.match_noise;
