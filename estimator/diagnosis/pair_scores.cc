@@ -258,7 +258,8 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
       score.frame_b = pair.frame_b;
       score.time_s = pair.time_b_s;
       score.block = static_cast<int>(scores.blocks.size());
-      score.residuals = static_cast<int>(system.r.size()) - (rotation ? 0 : 2);
+      score.residuals =
+          static_cast<int>(system.r.size()) - (rotation ? 0 : PairGraph::kLostPerPair);
       ProjectInto(system, scores.num_model, &score, &sum);
       scores.pairs.push_back(std::move(score));
     }

@@ -58,6 +58,9 @@ enum class AddPairResult {
 class PairGraph {
  public:
   static constexpr int kMinMatches = 8;
+  // Degrees of freedom that a pair's own direction and its turn take; the rest of the turn lies
+  // along the direction, where it changes nothing.
+  static constexpr int kLostPerPair = 4;
 
   // start: values with effects, and prior_sigma as the standard deviations of a Gaussian prior
   // around `prior_mean` (zero bias, guess of the files, no effects, ...).

@@ -37,7 +37,7 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
   result.calibration = start;
   PairGraphOptions graph_options = options.graph;
   const bool rotations = !pairs.empty() && pairs.front().matches.empty();
-  const int lost = rotations ? 0 : 2;
+  const int lost = rotations ? 0 : PairGraph::kLostPerPair;
   std::unique_ptr<PairGraph> graph;
   std::vector<int64_t> ids;
   const auto all_residuals = [&](bool search) {
