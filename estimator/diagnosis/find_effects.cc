@@ -276,7 +276,7 @@ class Loop {
     for (auto& [r, candidate] : all) {
       if (r.p_value * tests > options_.significance) {
         r.rejected = "not significant";
-      } else if (r.gain.sum < 2.0 * r.gain.sigma) {
+      } else if (!IsSure(r.gain, r.inflation)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
     }
@@ -290,6 +290,15 @@ class Loop {
     }
     for (auto& entry : all) result->candidates.push_back(std::move(entry.first));
     return added;
+  }
+
+  // A gain beyond its noise: beyond twice its scatter from block to block or, where the effect acts
+  // in some blocks only (a step early in the recording) so that the scatter is the effect itself,
+  // beyond twice the noise that the gain of a right effect has, 2 sqrt(gain), inflated as the test;
+  // a right effect then makes hardly any block worse.
+  static bool IsSure(const Gain& gain, double inflation) {
+    const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, inflation));
+    return gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -340,10 +349,11 @@ class Loop {
     Candidate candidate{entry, shape, entry->make(setup, shape), 0};
     if (candidate.effect == nullptr) return;
     // The gain on the choice share of a step as the fit share has it: by refit only. Here, what the
-    // statistic lets expect.
+    // statistic lets expect, in the units of chi2 as all gains are.
+    const double inflation = std::max(1.0, found.test.inflation);
     Gain gain;
-    gain.sum = found.test.statistic - 1.0;
-    gain.sigma = std::sqrt(2.0 + 4.0 * found.test.statistic) / 2.0;
+    gain.sum = (found.test.statistic - 1.0) * inflation;
+    gain.sigma = std::sqrt(2.0 + 4.0 * found.test.statistic) / 2.0 * inflation;
     all->emplace_back(MakeResult(candidate, found.test, gain), candidate);
     all->back().first.estimate = when.test.estimate;
   }
@@ -450,7 +460,7 @@ class Loop {
           r.rejected = p.name + " outside of what real devices show";
         }
       }
-      if (r.rejected.empty() && r.gain.sum < 2.0 * r.gain.sigma) {
+      if (r.rejected.empty() && !IsSure(r.gain, r.inflation)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
       if (r.rejected.empty()) rivals.push_back(std::move(rival));

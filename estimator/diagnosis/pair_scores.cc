@@ -258,8 +258,8 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
       score.frame_b = pair.frame_b;
       score.time_s = pair.time_b_s;
       score.block = static_cast<int>(scores.blocks.size());
-      score.residuals =
-          static_cast<int>(system.r.size()) - (rotation ? 0 : PairGraph::kLostPerPair);
+      // The direction takes two; the turn none, since chi2 has the penalty of its prior.
+      score.residuals = static_cast<int>(system.r.size()) - (rotation ? 0 : 2);
       ProjectInto(system, scores.num_model, &score, &sum);
       scores.pairs.push_back(std::move(score));
     }

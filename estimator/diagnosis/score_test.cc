@@ -188,7 +188,10 @@ Eigen::VectorXd StepOf(const Scores& scores, const std::vector<int>& columns,
 Gain SumOf(const std::vector<double>& gain_by_block) {
   Gain gain;
   const auto n = static_cast<double>(gain_by_block.size());
-  for (const double g : gain_by_block) gain.sum += g;
+  for (const double g : gain_by_block) {
+    gain.sum += g;
+    gain.lost += std::max(0.0, -g);
+  }
   double variance = 0.0;
   for (const double g : gain_by_block) variance += (g - gain.sum / n) * (g - gain.sum / n);
   gain.sigma = n > 1.0 ? std::sqrt(variance * n / (n - 1.0)) : 0.0;

@@ -35,6 +35,7 @@ Eigen::VectorXd StepOf(const Scores& scores, const std::vector<int>& columns,
 // Sum over blocks of a gain, and its standard deviation from the scatter between blocks.
 struct Gain {
   double sum = 0.0, sigma = 0.0;
+  double lost = 0.0;  // of the blocks that lose, as a positive number
 };
 Gain SumOf(const std::vector<double>& gain_by_block);
 
