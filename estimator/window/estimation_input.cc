@@ -12,8 +12,12 @@ namespace camgyro {
 PairSelection SelectPairs(const Recording& recording, int longest_gap, int least_pairs) {
   constexpr double kLongestS = 0.2;
   constexpr double kLeastMatches = 0.6;  // of the neighbours'
+  constexpr int kStride = 2;
   PairSelection selection;
-  if (!recording.matches.empty() || recording.tracks.empty()) return selection;
+  if (!recording.matches.empty() || recording.tracks.empty() ||
+      recording.match_noise != MatchNoise::kBothImages) {
+    return selection;
+  }
   const auto matches = [&](int gap) {
     size_t count = 0;
     for (const FramePair& pair : PairsFromTracks(recording.tracks, gap)) {
@@ -21,17 +25,15 @@ PairSelection SelectPairs(const Recording& recording, int longest_gap, int least
     }
     return static_cast<double>(count);
   };
-  const bool independent = recording.match_noise == MatchNoise::kBothImages;
   const double interval_s = MedianInterval(recording.frames);
   const int frames = static_cast<int>(recording.tracks.size());
   const double neighbours = matches(1);
-  for (int gap = independent ? 3 : 2; gap <= longest_gap; gap += independent ? 2 : 1) {
-    const int stride = independent ? 2 : gap;
-    if (gap * interval_s > kLongestS || frames < least_pairs * stride + gap ||
+  for (int gap = 3; gap <= longest_gap; gap += 2) {
+    if (gap * interval_s > kLongestS || frames < least_pairs * kStride + gap ||
         matches(gap) < kLeastMatches * neighbours) {
       break;
     }
-    selection = {gap, stride};
+    selection = {gap, kStride};
   }
   return selection;
 }

@@ -155,7 +155,6 @@ TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
       1e-6);
 }
 
-// No two pairs share noise, whichever kind it is.
 TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
   simulation::Scenario scenario = ShortScenario(10.0);
   const Recording recording = SimulateTracks(scenario)->recording;
@@ -175,13 +174,7 @@ TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
 
   Recording reanchored = recording;
   reanchored.match_noise = MatchNoise::kSecondImage;
-  const PairSelection chain = SelectPairs(reanchored);
-  EXPECT_EQ(chain.gap, 2);
-  EXPECT_EQ(chain.stride, chain.gap);
-  const EstimationInput chained = MakeEstimationInput(reanchored, chain);
-  for (size_t i = 1; i < chained.pairs.size(); ++i) {
-    EXPECT_EQ(chained.pairs[i].frame_a, chained.pairs[i - 1].frame_b);
-  }
+  EXPECT_EQ(SelectPairs(reanchored).gap, 1);
 
   // Too short for 100 pairs, or tracks too short: neighbours.
   EXPECT_EQ(SelectPairs(SimulateTracks(ShortScenario(3.0))->recording).gap, 1);
