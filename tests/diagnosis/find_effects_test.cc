@@ -83,6 +83,16 @@ TEST(FindEffects, NamesAClockThatRunsFast) {
   EXPECT_NEAR(found.estimate[0], 600.0, 3.0 * found.sigma[0]);
 }
 
+// It acts in a sixth of the recording: its gain scatters from block to block as much as it is.
+TEST(FindEffects, NamesAStepEarlyInTheRecording) {
+  const Diagnosis diagnosis =
+      Find(Simulate(10, {"duration_s=24", "effects.delay_step={time_s: 4, step_s: 0.012}"}));
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("delay_step"));
+  const CandidateResult& found = diagnosis.rounds.front().candidates.front();
+  EXPECT_NEAR(found.estimate[0], 0.012, 5.0 * found.sigma[0]);
+  EXPECT_NEAR(std::stod(found.shape), 4.0, 1.2);  // on the gyro's clock, to a block
+}
+
 // Not in the catalogue: every fifth stamp is 8 ms late.
 TEST(FindEffects, LeavesAPeriodicGlitchWithoutAName) {
   Recording recording = Simulate(6, {});
