@@ -123,8 +123,8 @@ Status OnlineCalibration::TryStart() {
 }
 
 void OnlineCalibration::ProcessWaiting() {
-  // Side by side, and without a common observation where each has its own error; see SelectPairs.
-  const size_t between = noise_ == MatchNoise::kBothImages && gap_ > 1 ? 1 : 0;
+  // Side by side, and without a common observation; see SelectPairs.
+  const size_t between = gap_ > 1 ? 1 : 0;
   while (frames_.size() > static_cast<size_t>(gap_) + between) {
     const size_t gap = NextGap();
     if (!AddPair(frames_[0], frames_[gap])) {
@@ -145,7 +145,7 @@ size_t OnlineCalibration::NextGap() const {
     return static_cast<double>(MatchesBetween(frames_[0].points, frames_[to].points).size());
   };
   for (size_t shorter = gap; shorter > 1; --shorter) {
-    if (matches(shorter) >= 0.6 * matches(1)) return shorter;
+    if (matches(shorter) >= kLeastMatchesOfGap * matches(1)) return shorter;
   }
   return 1;
 }

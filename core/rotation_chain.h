@@ -13,7 +13,7 @@ namespace camgyro {
 // lines between these values have the integrals of the curve through the samples (Gregory's rule,
 // to fourth order in the sampling interval h). Straight lines between the samples themselves lose
 // (2 pi nu h)^2 / 12 of what turns at frequency nu, and a focal length from them is as much too
-// long: 4e-4 at 200 Hz for a person who runs.
+// long: 4e-4 at 200 Hz in the simulator's running.
 inline Eigen::Vector3d ChainRate(const Eigen::Vector3d& before, const Eigen::Vector3d& rate,
                                  const Eigen::Vector3d& after, double interval_before_s,
                                  double interval_after_s) {

@@ -11,7 +11,6 @@ namespace camgyro {
 
 PairSelection SelectPairs(const Recording& recording, int longest_gap, int least_pairs) {
   constexpr double kLongestS = 0.2;
-  constexpr double kLeastMatches = 0.6;  // of the neighbours'
   constexpr int kStride = 2;
   PairSelection selection;
   if (!recording.matches.empty() || recording.tracks.empty() ||
@@ -30,7 +29,7 @@ PairSelection SelectPairs(const Recording& recording, int longest_gap, int least
   const double neighbours = matches(1);
   for (int gap = 3; gap <= longest_gap; gap += 2) {
     if (gap * interval_s > kLongestS || frames < least_pairs * kStride + gap ||
-        matches(gap) < kLeastMatches * neighbours) {
+        matches(gap) < kLeastMatchesOfGap * neighbours) {
       break;
     }
     selection = {gap, kStride};

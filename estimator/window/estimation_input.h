@@ -37,6 +37,8 @@ struct PairSelection {
   int stride = 1;
 };
 
+constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
+
 // The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
 // observation does not, so that neighbours tell least, and are biased where their parallax is as
 // small as the noise (docs/benchmark.md). The gap is the longest up to 0.2 s that keeps 60 % of the

@@ -148,12 +148,8 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
       Calibration start = input.start;
       start.prior_sigma = input.prior.prior_sigma;
       EkfRun result;
-      Measure(
-          [&] {
-            result =
-                RunEkf(MakeEstimationInput(input.recording), input.recording.frames, start, ekf);
-          },
-          &run);
+      const EstimationInput neighbours = MakeEstimationInput(input.recording);
+      Measure([&] { result = RunEkf(neighbours, input.recording.frames, start, ekf); }, &run);
       TakeTrace(result.trace, input, &run);
     } else if (name == "window") {
       run_window();
