@@ -5,6 +5,7 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <set>
 
 #include "tools/simulation/simulate.h"
 
@@ -132,6 +133,26 @@ TEST(Render, NoiseIsThatOfPhotons) {
   const double light = cv::mean(a)[0] / 255.0;
   EXPECT_NEAR(sigma[0], std::sqrt(2.0 * (255.0 * 255.0 * light / 2000.0 + 1.0 / 12.0)), 0.15);
   EXPECT_NEAR(mean[0], 0.0, 0.1);
+}
+
+TEST(Render, BlurHasNoSkew) {
+  for (int least = 4; least <= 64; ++least) {
+    const std::vector<Sample> samples = SamplesOfPixel(least);
+    ASSERT_GE(static_cast<int>(samples.size()), least);
+    ASSERT_LE(static_cast<int>(samples.size()), least + 2);
+    std::set<double> times, u, v;
+    for (size_t k = 0; k < samples.size(); ++k) {
+      const Sample& mirror = samples[samples.size() - 1 - k];
+      EXPECT_NEAR(samples[k].time, -mirror.time, 1e-12);
+      EXPECT_LT((samples[k].offset_px + mirror.offset_px).norm(), 1e-12) << least;
+      times.insert(samples[k].time);
+      u.insert(samples[k].offset_px.x());
+      v.insert(samples[k].offset_px.y());
+    }
+    EXPECT_EQ(times.size(), samples.size());
+    EXPECT_EQ(u.size(), samples.size()) << least;
+    EXPECT_EQ(v.size(), samples.size()) << least;
+  }
 }
 
 TEST(Render, ExposureBlursAlongTheMotion) {

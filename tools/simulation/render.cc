@@ -49,8 +49,8 @@ cv::Mat Renderer::RenderSensor(const FrameTiming& timing) {
   const CameraState state = camera_.trajectory().At(camera_.ExposureTime(timing, centre));
   const double blur_px = (state.omega_cam_rad_s.norm() + 0.3 * state.v_world_m_s.norm()) *
                          timing.exposure_s * camera.focal_px;
-  const int samples =
-      std::clamp(static_cast<int>(std::ceil(blur_px)), 4, scenario_.video.max_blur_samples);
+  const std::vector<Sample> samples = SamplesOfPixel(
+      std::clamp(static_cast<int>(std::ceil(blur_px)), 4, scenario_.video.max_blur_samples));
 
   const bool columns = scenario_.effects.readout_direction.columns;
   const int lines = columns ? camera.width_px : camera.height_px;
@@ -106,7 +106,18 @@ void Renderer::FindBoxes(const FrameTiming& timing) {
   }
 }
 
-void Renderer::RenderLine(const FrameTiming& timing, int line, int samples,
+std::vector<Sample> SamplesOfPixel(int least) {
+  int count = least;
+  while (count % 3 == 0 || count % 5 == 0) ++count;
+  const auto spaced = [count](int index) { return (index % count + 0.5) / count - 0.5; };
+  std::vector<Sample> samples;
+  for (int k = 0; k < count; ++k) {
+    samples.push_back({spaced(k), Vector2d(spaced(3 * k + 1), spaced(5 * k + 2))});
+  }
+  return samples;
+}
+
+void Renderer::RenderLine(const FrameTiming& timing, int line, const std::vector<Sample>& samples,
                           std::vector<float>* brightness) {
   const CameraOptions& camera = scenario_.camera;
   const bool columns = scenario_.effects.readout_direction.columns;
@@ -138,15 +149,11 @@ void Renderer::RenderLine(const FrameTiming& timing, int line, int samples,
   }
 
   brightness->assign(static_cast<size_t>(length), 0.0f);
-  for (int k = 0; k < samples; ++k) {
-    // Times, and offsets in both directions of the pixel, are permutations of the same even
-    // spacing: each has mean zero.
-    const auto spaced = [&](int index) { return (index % samples + 0.5) / samples - 0.5; };
-    const double time_s = line_time_s + timing.exposure_s * spaced(k);
+  for (const Sample& sample : samples) {
+    const double time_s = line_time_s + timing.exposure_s * sample.time;
     const CameraState state = camera_.trajectory().At(time_s);
     const Vector2d shift = camera_.StabiliserShift(time_s) - line_shift;
-    const Vector2d offset =
-        (Vector2d(spaced(k * 3 + 1), spaced(k * 5 + samples / 2)) - shift).cwiseQuotient(focal);
+    const Vector2d offset = (sample.offset_px - shift).cwiseQuotient(focal);
     for (size_t node = 0; node + 1 < nodes.size(); ++node) {
       if (nodes[node].z() == 0.0 || nodes[node + 1].z() == 0.0) continue;  // the lens is blind here
       Vector3d ray = nodes[node];
@@ -167,7 +174,7 @@ void Renderer::RenderLine(const FrameTiming& timing, int line, int samples,
       }
     }
   }
-  for (float& value : *brightness) value /= static_cast<float>(samples);
+  for (float& value : *brightness) value /= static_cast<float>(samples.size());
 }
 
 float Renderer::Shade(const Hit& hit, const Vector3d& origin, const Vector3d& direction,
