@@ -13,7 +13,7 @@ import os
 import subprocess
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import yaml
 
@@ -53,20 +53,7 @@ def run(options, case):
     return result
 
 
-def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--duration", type=float, default=40.0)
-    parser.add_argument("--motions", default="walking,running")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
-    options = parser.parse_args()
-    scenarios = sorted(glob.glob(SOURCE + "/tools/scenarios/effect_*.yaml"))
-    scenarios.append(SOURCE + "/tools/scenarios/default.yaml")
-    cases = [(s, m, seed) for s in scenarios for m in options.motions.split(",")
-             for seed in range(1, options.seeds + 1)]
-    with ThreadPoolExecutor(options.jobs) as pool:
-        results = list(pool.map(lambda case: run(options, case), cases))
+def write(options, scenarios, results):
     with open(SOURCE + "/docs/diagnosis_simulated.md", "w", encoding="utf-8") as out:
         out.write("# The diagnosis of simulated recordings\n\nMade by `tools/diagnose_simulated.py "
                   "--seeds %d --duration %g --motions %s`: scenarios of `tools/scenarios`, the "
@@ -79,6 +66,8 @@ def main():
         for scenario in scenarios:
             for motion in options.motions.split(","):
                 rows = [r for r in results if r["case"][:2] == (scenario, motion)]
+                if not rows:
+                    continue
                 name = os.path.basename(scenario)[:-5]
                 effect = name.replace("effect_", "")
                 named = {}
@@ -92,6 +81,25 @@ def main():
                     "; ".join("%s (%d)" % item for item in sorted(named.items())),
                     sum(r["unexplained"] for r in rows), len(rows), rows[0]["parameters"],
                     rows[0]["chi2"], sum(r["seconds"] for r in rows) / len(rows)))
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--duration", type=float, default=40.0)
+    parser.add_argument("--motions", default="walking,running")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
+    options = parser.parse_args()
+    scenarios = sorted(glob.glob(SOURCE + "/tools/scenarios/effect_*.yaml"))
+    scenarios.append(SOURCE + "/tools/scenarios/default.yaml")
+    cases = [(s, m, seed) for s in scenarios for m in options.motions.split(",")
+             for seed in range(1, options.seeds + 1)]
+    results = []
+    with ThreadPoolExecutor(options.jobs) as pool:
+        for done in as_completed([pool.submit(run, options, case) for case in cases]):
+            results.append(done.result())
+            write(options, scenarios, sorted(results, key=lambda r: cases.index(r["case"])))
 
 
 if __name__ == "__main__":

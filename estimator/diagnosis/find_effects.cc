@@ -245,30 +245,37 @@ class Loop {
     for (const auto& item : maps.set()->items()) {
       with_maps->Add(item.entry, item.shape, item.effect);
     }
-    const Scores choice = ScoresOf(shares_.choice, model, with_maps, noise);
+    const Scores mapped = ScoresOf(shares_.choice, model, with_maps, noise);
+    const Scores choice = FirstColumns(mapped, first_map);
     const Scores fit = ScoresOf(shares_.fit, model, set, noise);
     const Eigen::VectorXd prior = PriorInformation(in_.prior, model.effects.get(), *with_maps);
     const Eigen::VectorXd fit_prior = prior.head(first_map);
-    last_maps_ = maps.Evaluate(choice, first_map, prior);
+    last_maps_ = maps.Evaluate(mapped, first_map, prior);
     result->before = result->after =
         Summarise(ScoresOf(shares_.report, model, nullptr, noise), noise);
 
-    const auto gain_of_fit_step = [&](const std::vector<int>& columns) {
-      Eigen::VectorXd step = Eigen::VectorXd::Zero(prior.size());
-      step.head(first_map) = StepOf(fit, columns, fit_prior);
-      return GainOfStep(choice, step);
+    // Of each share by the other's step, by block; halved, to compare with a refit's gain in one.
+    const auto gain_of_step = [&](const std::vector<int>& columns) {
+      std::vector<double> gain = GainOfStep(choice, StepOf(fit, columns, fit_prior));
+      const std::vector<double> other = GainOfStep(fit, StepOf(choice, columns, fit_prior));
+      gain.insert(gain.end(), other.begin(), other.end());
+      for (double& g : gain) g *= 0.5;
+      return gain;
     };
-    const std::vector<double> without = gain_of_fit_step({});
+    const std::vector<double> without = gain_of_step({});
+    // Significance by both shares: what was fitted is projected out of the scores, which makes
+    // those of the fit's own frames as good as unseen ones.
+    const Scores both = Joint(fit, choice);
     std::vector<std::pair<CandidateResult, Candidate>> all;
     for (const Candidate& candidate : candidates) {
-      const ScoreTest test = TestColumns(choice, candidate.columns(), prior);
-      std::vector<double> gain = gain_of_fit_step(candidate.columns());
+      const ScoreTest test = TestColumns(both, candidate.columns(), fit_prior);
+      std::vector<double> gain = gain_of_step(candidate.columns());
       for (size_t i = 0; i < gain.size(); ++i) gain[i] -= without[i];
       all.emplace_back(MakeResult(candidate, test, SumOf(gain)), candidate);
       all.back().first.start = StepOf(fit, candidate.columns(), fit_prior)
                                    .segment(candidate.first, candidate.effect->size());
     }
-    AddStepCandidate(setup, fit, choice, prior, &all);
+    AddStepCandidate(setup, both, fit_prior, &all);
     AddTurnCandidate(setup, choice, &all);
 
     // Significance, all candidates together, and a gain beyond its own noise.
@@ -276,7 +283,7 @@ class Loop {
     for (auto& [r, candidate] : all) {
       if (r.p_value * tests > options_.significance) {
         r.rejected = "not significant";
-      } else if (!IsSure(r.gain, r.inflation)) {
+      } else if (!IsSure(r.gain, r.inflation, 2.0)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
     }
@@ -292,13 +299,14 @@ class Loop {
     return added;
   }
 
-  // A gain beyond its noise: beyond twice its scatter from block to block or, where the effect acts
-  // in some blocks only (a step early in the recording) so that the scatter is the effect itself,
-  // beyond twice the noise that the gain of a right effect has, 2 sqrt(gain), inflated as the test;
-  // a right effect then makes hardly any block worse.
-  static bool IsSure(const Gain& gain, double inflation) {
+  // A gain beyond its noise: beyond so many times its scatter from block to block or, where the
+  // effect acts in some blocks only (a step early in the recording) so that the scatter is the
+  // effect itself, beyond twice the noise that the gain of a right effect has, 2 sqrt(gain),
+  // inflated as the test; a right effect then makes hardly any block worse.
+  static bool IsSure(const Gain& gain, double inflation, double scatter) {
     const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, inflation));
-    return gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
+    return gain.sum > scatter * gain.sigma ||
+           (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -319,43 +327,45 @@ class Loop {
     return r;
   }
 
-  void AddStepCandidate(const EffectSetup& setup, const Scores& fit, const Scores& choice,
-                        const Eigen::VectorXd& prior,
+  void AddStepCandidate(const EffectSetup& setup, const Scores& both, const Eigen::VectorXd& prior,
                         std::vector<std::pair<CandidateResult, Candidate>>* all) const {
     const EffectEntry* entry = FindEffect("delay_step");
-    const double margin_s = 1.5 * shares_.block_s;
-    const StepSearch found = SearchDelayStep(choice, prior, margin_s);
+    const StepSearch found = SearchDelayStep(both, prior, 1.5 * shares_.block_s);
     if (found.test.dof == 0) return;
-    // When: by both shares, since the step may lie in a block of either. The fit share is given the
-    // blocks' numbers after those of the choice share.
-    Scores joint = choice;
-    const int offset = static_cast<int>(choice.blocks.size());
-    for (BlockScore block : fit.blocks) {
-      block.g.conservativeResize(choice.blocks[0].g.size());
-      block.H.conservativeResize(choice.blocks[0].H.rows(), choice.blocks[0].H.cols());
-      joint.blocks.push_back(std::move(block));
-    }
-    for (PairScore pair : fit.pairs) {
-      pair.block += offset;
-      joint.pairs.push_back(std::move(pair));
-    }
-    std::sort(joint.pairs.begin(), joint.pairs.end(),
-              [](const PairScore& a, const PairScore& b) { return a.time_s < b.time_s; });
-    const StepSearch when = SearchDelayStep(joint, prior, margin_s);
-    if (when.test.dof == 0) return;
     char shape[40];
     // Between two frames: a step shows from its first frame on.
-    std::snprintf(shape, sizeof shape, "%.4f", when.time_s - 1e-3);
+    std::snprintf(shape, sizeof shape, "%.4f", found.time_s - 1e-3);
     Candidate candidate{entry, shape, entry->make(setup, shape), 0};
     if (candidate.effect == nullptr) return;
-    // The gain on the choice share of a step as the fit share has it: by refit only. Here, what the
-    // statistic lets expect, in the units of chi2 as all gains are.
+    // The gain on unseen frames is known by refit only. Here, what the statistic lets expect, in
+    // the units of chi2 as all gains are.
     const double inflation = std::max(1.0, found.test.inflation);
     Gain gain;
     gain.sum = (found.test.statistic - 1.0) * inflation;
     gain.sigma = std::sqrt(2.0 + 4.0 * found.test.statistic) / 2.0 * inflation;
     all->emplace_back(MakeResult(candidate, found.test, gain), candidate);
-    all->back().first.estimate = when.test.estimate;
+  }
+
+  static Scores FirstColumns(Scores scores, Eigen::Index columns) {
+    for (BlockScore& block : scores.blocks) {
+      block.g.conservativeResize(columns);
+      block.H.conservativeResize(columns, columns);
+    }
+    for (PairScore& pair : scores.pairs) pair.g.conservativeResize(columns);
+    return scores;
+  }
+
+  // Pairs in the order of time, as the search for a step needs them.
+  static Scores Joint(const Scores& fit, const Scores& choice) {
+    Scores both = fit;
+    both.blocks.insert(both.blocks.end(), choice.blocks.begin(), choice.blocks.end());
+    for (PairScore pair : choice.pairs) {
+      pair.block += static_cast<int>(fit.blocks.size());
+      both.pairs.push_back(std::move(pair));
+    }
+    std::sort(both.pairs.begin(), both.pairs.end(),
+              [](const PairScore& a, const PairScore& b) { return a.time_s < b.time_s; });
+    return both;
   }
 
   void AddTurnCandidate(const EffectSetup& setup, const Scores& choice,
@@ -434,12 +444,7 @@ class Loop {
         const Result<Refined> other = Fit(anew, in_.noise);
         if (other && (!fit || FitChi2(*other) < FitChi2(*fit))) fit = other;
       }
-      if (fit && Remake(&fit->calibration)) {
-        Calibration again = fit->calibration;
-        again.prior_sigma = in_.prior.prior_sigma;
-        const Result<Refined> better = Fit(again, fit->quality.noise_px);
-        if (better) fit = better;
-      }
+      if (fit) fit = Settle(*std::move(fit));
       if (!fit) {
         r.rejected = "the fit with it failed: " + fit.error().message;
         continue;
@@ -460,8 +465,13 @@ class Loop {
           r.rejected = p.name + " outside of what real devices show";
         }
       }
-      if (r.rejected.empty() && !IsSure(r.gain, r.inflation)) {
+      // The refit's gain is that of one share, of half of the frames: it confirms.
+      if (r.rejected.empty() && !IsSure(r.gain, r.inflation, 1.0)) {
         r.rejected = "no gain on unseen frames beyond its noise";
+      }
+      if (r.rejected.empty() &&
+          PValueOfFit(fit->calibration, r.inflation) > options_.significance) {
+        r.rejected = "not significant once fitted";
       }
       if (r.rejected.empty()) rivals.push_back(std::move(rival));
     }
@@ -507,6 +517,35 @@ class Loop {
     std::rotate(all->begin(), all->begin() + static_cast<std::ptrdiff_t>(best.at),
                 all->begin() + static_cast<std::ptrdiff_t>(best.at) + 1);
     return true;
+  }
+
+  // Of the last effect's parameters being all zero, by their fit (Wald). The score extrapolates
+  // from zero, at derivatives of a model that may be far off.
+  static double PValueOfFit(const Calibration& calibration, double inflation) {
+    const EffectSet::Item& item = calibration.effects->items().back();
+    const int n = item.effect->size();
+    const Eigen::VectorXd value = calibration.effect_values.segment(item.first, n);
+    const Eigen::MatrixXd covariance =
+        calibration.effect_covariance.block(item.first, item.first, n, n);
+    const double statistic = value.dot(covariance.completeOrthogonalDecomposition().solve(value));
+    return ChiSquareTail(statistic / std::max(1.0, inflation), n);
+  }
+
+  // Effects that depend on the calibration are made with the one that they led to, until it stays
+  // within a tenth of a sigma: what is left to gain by that would be taken for the next effect's.
+  Refined Settle(Refined fit) const {
+    constexpr int kMostTimes = 5;
+    for (int i = 0; i < kMostTimes && Remake(&fit.calibration); ++i) {
+      Calibration again = fit.calibration;
+      again.prior_sigma = in_.prior.prior_sigma;
+      Result<Refined> better = Fit(again, fit.quality.noise_px);
+      if (!better) break;
+      const StateVector moved = Difference(better->calibration, fit.calibration)
+                                    .cwiseQuotient(better->calibration.sigma());
+      fit = *std::move(better);
+      if (moved.cwiseAbs().maxCoeff() < 0.1) break;
+    }
+    return fit;
   }
 
   // Makes those effects anew that depend on the calibration; false if there are none.

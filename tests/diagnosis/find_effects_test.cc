@@ -93,6 +93,16 @@ TEST(FindEffects, NamesAStepEarlyInTheRecording) {
   EXPECT_NEAR(std::stod(found.shape), 4.0, 1.2);  // on the gyro's clock, to a block
 }
 
+// Four sigmas in the choice share alone: both shares have to tell.
+TEST(FindEffects, NamesTheGyrosFilterWhenWalking) {
+  const Diagnosis diagnosis =
+      Find(Simulate(1, {"duration_s=40", "tracks.count=120", "tracks.noise_px=0.7",
+                        "effects.gyro_lowpass.time_constant_s=0.008"}));
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("gyro_lowpass"));
+  const CandidateResult& found = diagnosis.rounds.front().candidates.front();
+  EXPECT_NEAR(found.estimate[0], 0.008 * 0.008, 4.0 * found.sigma[0]);
+}
+
 // Not in the catalogue: every fifth stamp is 8 ms late.
 TEST(FindEffects, LeavesAPeriodicGlitchWithoutAName) {
   Recording recording = Simulate(6, {});
