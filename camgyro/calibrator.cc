@@ -67,7 +67,7 @@ class TrackCleaner {
         ++match;
       }
       names.emplace(point.track_id, name);
-      cleaned.push_back({name, point.px});
+      cleaned.push_back({name, point.px, point.noise_factor});
     }
     names_ = std::move(names);
     std::sort(cleaned.begin(), cleaned.end(),

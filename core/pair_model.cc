@@ -76,7 +76,13 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
   const Eigen::Matrix<double, 3, 2> J_cam =
       b->lens_ray.J_ray_px + b->omega_cam_rad_s.cross(b->lens_ray.ray) * b->J_time_px;
   b->J_ray_px = b->R_ref_cam * J_cam;
+  b->noise_factor.setIdentity();
   return true;
+}
+
+void Bearing::ScaleNoise(const Eigen::Vector3d& factor) {
+  noise_factor << factor[0], 0.0, factor[1], factor[2];
+  J_ray_px *= noise_factor;
 }
 
 void Backpropagate(const Bearing& b, const RotationChain& chain, double height_px,
@@ -86,7 +92,8 @@ void Backpropagate(const Bearing& b, const RotationChain& chain, double height_p
   const Eigen::Vector3d& omega = b.omega_cam_rad_s;
   // In the camera frame at the time of exposure.
   const Eigen::Vector3d by_ray_cam = b.R_ref_cam.transpose() * by_ray;
-  const Eigen::Matrix<double, 3, 2> by_J_cam = b.R_ref_cam.transpose() * by_J_ray_px;
+  const Eigen::Matrix<double, 3, 2> by_J_cam =
+      b.R_ref_cam.transpose() * by_J_ray_px * b.noise_factor.transpose();
   const Eigen::Vector3d by_J_time = by_J_cam * b.J_time_px.transpose();  // by omega x ray
 
   // Lens: through the ray (which also enters the row-time part of J) and through J_ray_px.

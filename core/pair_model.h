@@ -39,6 +39,10 @@ struct Bearing {
   Eigen::Vector3d ray_ref;               // R_ref_gyro(t) R_gyro_cam ray_cam
   Eigen::Matrix<double, 3, 2> J_ray_px;  // through the lens and through the row's time
 
+  // Multiplies J_ray_px from the right by TrackedPoint::noise_factor, so that unit noise of a
+  // pixel, alike in all directions, makes the ray's.
+  void ScaleNoise(const Eigen::Vector3d& factor);
+
   // What Backpropagate needs.
   RayJet lens_ray;
   RotationChain::State rotation;
@@ -47,6 +51,7 @@ struct Bearing {
   Eigen::RowVector2d J_time_px;  // of the time of exposure [s/px]
   double row_fraction = 0.0;     // v / h
   EffectSet::Change change;      // empty without effects
+  Eigen::Matrix2d noise_factor = Eigen::Matrix2d::Identity();
 };
 
 // Derivatives of one scalar by the parameters of a pair; rates are added by the caller's chain.

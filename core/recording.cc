@@ -36,7 +36,9 @@ std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoin
     for (const TrackedPoint& point : tracks[a]) {
       while (it_b != tracks[b].end() && it_b->track_id < point.track_id) ++it_b;
       if (it_b == tracks[b].end()) break;
-      if (it_b->track_id == point.track_id) pair.matches.push_back({point.px, it_b->px});
+      if (it_b->track_id == point.track_id) {
+        pair.matches.push_back({point.px, it_b->px, it_b->noise_factor});
+      }
     }
     pairs.push_back(std::move(pair));
   }

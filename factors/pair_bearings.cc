@@ -26,6 +26,7 @@ bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chai
                          &bearings->b[i], derivatives)) {
       return false;
     }
+    bearings->b[i].ScaleNoise(pair.matches[i].noise_factor_b);
   }
   return true;
 }

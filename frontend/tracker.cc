@@ -11,6 +11,10 @@ namespace {
 
 const cv::TermCriteria kStop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.005);
 constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KLT has no texture
+// Variance that no texture takes away (interpolation, changes of shape), over that of the typical
+// corner.
+constexpr double kLeastVariance = 0.05;
+constexpr size_t kPointsForReference = 20;
 
 // Interpolation takes one pixel more than the patch.
 int Border(const TrackerOptions& options) { return options.window_px / 2 + 1; }
@@ -53,6 +57,22 @@ std::optional<cv::Mat> LikePrevious(const cv::Mat& gray, const std::vector<cv::M
   return alike;
 }
 
+// Inverse of the patch's mean structure tensor [px^2 per grey^2]: what KLT makes of grey noise, but
+// for a factor. derivatives: Scharr's, 32 times the gradient, as in OpenCV's pyramids.
+Eigen::Matrix2d InverseStructureTensor(const cv::Mat& derivatives, const cv::Point2f& point,
+                                       int window_px) {
+  const int half = window_px / 2, x = cvRound(point.x), y = cvRound(point.y);
+  Eigen::Matrix2d tensor = 1e-6 * Eigen::Matrix2d::Identity();
+  for (int v = std::max(0, y - half); v <= std::min(derivatives.rows - 1, y + half); ++v) {
+    const auto* row = derivatives.ptr<cv::Vec2s>(v);
+    for (int u = std::max(0, x - half); u <= std::min(derivatives.cols - 1, x + half); ++u) {
+      const Eigen::Vector2d gradient = Eigen::Vector2d(row[u][0], row[u][1]) / 32.0;
+      tensor += gradient * gradient.transpose() / (window_px * window_px);
+    }
+  }
+  return tensor.inverse();
+}
+
 }  // namespace
 
 int PyramidLevels(int window_px, double motion_px) {
@@ -68,6 +88,7 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
     pyramid_.clear();
     ids_.clear();
     points_.clear();
+    noise_factors_.clear();
     size_ = gray.size();
   }
   if (gray.empty() || gray.type() != CV_8UC1) return {};
@@ -79,7 +100,7 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
 
   std::vector<TrackedPoint> tracked(points_.size());
   for (size_t i = 0; i < points_.size(); ++i) {
-    tracked[i] = {ids_[i], Eigen::Vector2d(points_[i].x, points_[i].y)};
+    tracked[i] = {ids_[i], Eigen::Vector2d(points_[i].x, points_[i].y), noise_factors_[i]};
   }
   return tracked;
 }
@@ -134,6 +155,7 @@ void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& p
   // Ids ascend, so of two points that have run into one the older stays.
   const double too_close_px = 0.5 * options_.min_distance_px;
   size_t kept = 0;
+  std::vector<Eigen::Matrix2d> shapes(points_.size());
   for (size_t i = 0; i < points_.size(); ++i) {
     bool good = search.found[i];
     for (size_t j = 0; j < kept && good; ++j) {
@@ -141,11 +163,33 @@ void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& p
     }
     if (!good) continue;
     ids_[kept] = ids_[i];
+    shapes[kept] = InverseStructureTensor(pyramid_[1], points_[i], options_.window_px);
     points_[kept] = search.points[i];
     ++kept;
   }
   ids_.resize(kept);
   points_.resize(kept);
+  shapes.resize(kept);
+  noise_factors_ = NoiseFactors(shapes);
+}
+
+std::vector<Eigen::Vector3d> KltTracker::NoiseFactors(const std::vector<Eigen::Matrix2d>& shapes) {
+  std::vector<Eigen::Vector3d> factors(shapes.size(), Eigen::Vector3d(1.0, 0.0, 1.0));
+  if (!(reference_ > 0.0)) {
+    if (shapes.size() < kPointsForReference) return factors;
+    std::vector<double> variances;
+    for (const Eigen::Matrix2d& shape : shapes) variances.push_back(0.5 * shape.trace());
+    const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
+    std::nth_element(variances.begin(), middle, variances.end());
+    reference_ = *middle;
+  }
+  for (size_t i = 0; i < shapes.size(); ++i) {
+    const Eigen::Matrix2d covariance =
+        shapes[i] / reference_ + kLeastVariance * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix2d L = covariance.llt().matrixL();
+    factors[i] << L(0, 0), L(1, 0), L(1, 1);
+  }
+  return factors;
 }
 
 void KltTracker::AddCorners(const cv::Mat& gray) {
@@ -188,6 +232,7 @@ void KltTracker::AddCorners(const cv::Mat& gray) {
     ++in_cell;
     ids_.push_back(next_id_++);
     points_.push_back(corner);
+    noise_factors_.emplace_back(1.0, 0.0, 1.0);
   }
 }
 

@@ -42,6 +42,12 @@ struct TrackerOptions {
 // against one direct step, per axis: 2 steps 0.004 px (median), 0.02 px (90 %) on
 // euroc-v101-flight, 0.009 and 0.16 px on phone-cc9-street; 4 steps 0.007, 0.03 and 0.02, 0.32 px.
 //
+// How the noise lies (TrackedPoint::noise_factor): the inverse of the template patch's structure
+// tensor, over that of the typical corner in the first pair of frames. Measured on a rendered video
+// against its truth: sigma = 0.69 to 0.90 lambda^-1/2 px over a factor of 16 in the eigenvalue lambda
+// (grey^2 / px^2), 0.04 to 0.16 px. Motion blur makes the noise along the motion up to twice as large
+// as across; taken for alike, it shifts f by 0.2 to 0.3 % (five sigmas).
+//
 // Exposure: where the points show that it changed, the frame is searched once more with the
 // brightness of the one before, if the first search finds 20. With every other frame 20 % darker,
 // 98.5 % of the points survive a frame on euroc-v101-flight (73 % without; 99 % unchanged) and 86.5
@@ -69,6 +75,7 @@ class KltTracker {
                       const std::vector<cv::Point2f>& start) const;
   void FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& pyramid,
                     const PointPredictor& predictor);
+  std::vector<Eigen::Vector3d> NoiseFactors(const std::vector<Eigen::Matrix2d>& shapes);
   void AddCorners(const cv::Mat& gray);
 
   TrackerOptions options_;
@@ -76,6 +83,8 @@ class KltTracker {
   std::vector<cv::Mat> pyramid_;  // of the previous frame, with derivatives
   std::vector<int64_t> ids_;      // ascending
   std::vector<cv::Point2f> points_;
+  std::vector<Eigen::Vector3d> noise_factors_;
+  double reference_ = 0.0;  // variance of the typical corner in the first pair of frames
   int64_t next_id_ = 0;
 };
 

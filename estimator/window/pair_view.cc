@@ -129,6 +129,7 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
                         match.px_a, calibration.pair_effects(), &a) &&
         EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, m.frame_b, m.size_px,
                         match.px_b, calibration.pair_effects(), &b)) {
+      b.ScaleNoise(match.noise_factor_b);
       m.matches.push_back(match);
       view->bearings.a.push_back(a);
       view->bearings.b.push_back(b);

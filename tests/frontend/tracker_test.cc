@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <set>
 
@@ -215,6 +216,48 @@ TEST(KltTracker, PredictionThatIsNotFiniteIsNoPrediction) {
   const auto b = without.Add(second);
   ASSERT_EQ(a.size(), b.size());
   for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].px, b[i].px);
+}
+
+// A picture that moves to the right is blurred along x: corners are found less well there.
+TEST(KltTracker, KnowsWhereItsNoiseIs) {
+  const Waves scene(5, 0.0);
+  std::mt19937 generator(6);
+  std::normal_distribution<double> noise(0.0, 2.0);
+  KltTracker tracker;
+  std::vector<TrackedPoint> before;
+  double raw_x = 0.0, raw_y = 0.0, x = 0.0, y = 0.0;
+  int count = 0;
+  for (int i = 0; i < 12; ++i) {
+    cv::Mat picture = scene.Render(320, 240, Eigen::Vector2d(3.0 * i, 0.0));
+    if (i >= 2) cv::blur(picture, picture, cv::Size(13, 1));
+    for (int v = 0; v < picture.rows; ++v) {
+      for (int u = 0; u < picture.cols; ++u) {
+        picture.at<uchar>(v, u) =
+            cv::saturate_cast<uchar>(picture.at<uchar>(v, u) + noise(generator));
+      }
+    }
+    const std::vector<TrackedPoint> now = tracker.Add(picture);
+    for (const TrackedPoint& point : now) {
+      const auto old = std::find_if(before.begin(), before.end(), [&](const TrackedPoint& p) {
+        return p.track_id == point.track_id;
+      });
+      if (i < 3 || old == before.end()) continue;
+      const Eigen::Vector2d error = point.px - old->px - Eigen::Vector2d(3.0, 0.0);
+      const Eigen::Vector3d& L = point.noise_factor;
+      const Eigen::Vector2d whitened(error.x() / L[0],
+                                     (error.y() - L[1] * error.x() / L[0]) / L[2]);
+      raw_x += error.x() * error.x();
+      raw_y += error.y() * error.y();
+      x += whitened.x() * whitened.x();
+      y += whitened.y() * whitened.y();
+      ++count;
+    }
+    before = now;
+  }
+  ASSERT_GT(count, 500);
+  EXPECT_GT(raw_x / raw_y, 4.0);
+  EXPECT_LT(x / y, 0.3 * raw_x / raw_y);
+  EXPECT_GT(x / y, 0.6);
 }
 
 TEST(KltTracker, DropsWhatTheOtherPictureDoesNotShow) {
