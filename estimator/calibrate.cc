@@ -197,6 +197,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     if (progress) progress(stage, done);
   };
   CalibrationReport report;
+  report.residual = options.residual;
   StageClock clock(&report.times);
   const bool attitudes = recording.matches.empty() && recording.tracks.empty();
   const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));

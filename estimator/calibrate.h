@@ -23,7 +23,7 @@ using Progress = std::function<void(const std::string& stage, double done)>;
 struct CalibrateOptions {
   ResidualKind residual = ResidualKind::kPlane;
   bool refine = true;   // false: the online estimate is the result
-  std::string effects;  // of the catalogue, to fit as well; see MakeEffects
+  std::string effects;  // of the catalogue, to fit as well, not with transfers; see MakeEffects
   StartOptions start;
   // What was found before (diagnosis): a start that is not searched again, and values with effects
   // to begin from.
@@ -47,6 +47,7 @@ struct CalibrationReport {
   std::vector<WindowUpdate> trace;  // one per solved window
   int pairs_used_online = 0;
 
+  ResidualKind residual = ResidualKind::kPlane;  // that was fitted
   StartResult start;
   FitQuality quality;
   // Each half of the recording under the fit of the other half. The result itself uses all frames.

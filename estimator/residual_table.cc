@@ -5,6 +5,12 @@
 #include "estimator/window/pair_view.h"
 
 namespace camgyro {
+namespace {
+
+// Median of the magnitude of a Gaussian by that of the length of two.
+constexpr double kMedianOfOne = 0.67449 / 1.17741;
+
+}  // namespace
 
 std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
                                             const std::vector<TimedPair>& pairs,
@@ -17,7 +23,12 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
     if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
     const PairBearings& bearings = view.bearings;
     if (bearings.a.size() < PairGraph::kMinMatches) continue;
-    const PairPlane plane = FitPlane(view);
+    const bool transfer = options.residual == ResidualKind::kSymmetricTransfer;
+    const PairPlane plane = transfer ? PairPlane() : FitPlane(view);
+    const std::vector<double> transfers =
+        transfer ? TransferResiduals(view, calibration) : std::vector<double>();
+    const double sigma_of_two_px =
+        std::sqrt(view.measurement.variance_a() + view.measurement.variance_b());
     for (size_t i = 0; i < bearings.a.size(); ++i) {
       const Bearing &a = bearings.a[i], &b = bearings.b[i];
       MatchResidual row;
@@ -26,11 +37,19 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
       row.match = view.measurement.matches[i];
       row.time_s = RowTimeGyroS(pair.time_b_s, shutter, row.match.px_b.y(), calibration.height_px);
       row.rate_rad_s = b.omega_cam_rad_s.norm();
+      if (transfer) {
+        const Eigen::Vector2d two(transfers[2 * i], transfers[2 * i + 1]);
+        row.residual_px = kMedianOfOne * two.norm() * noise_px;
+        row.correction_px = -sigma_of_two_px * two;
+        row.inlier = two.norm() <= options.inlier_sigmas();
+        residuals.push_back(row);
+        continue;
+      }
       const double sigmas = ResidualOf(view, plane, i).value;
       const double share = CoplanarityPlane::RowShare(view.measurement, row.match);
       const Eigen::Vector3d tau = plane.tau + share * plane.turn;
       row.residual_px = sigmas * noise_px;
-      row.inlier = std::abs(sigmas) <= options.robust_threshold;
+      row.inlier = std::abs(sigmas) <= options.inlier_sigmas();
       // tau . (a x b) = (tau x a) . b moves with px_b, in units of its noise, as this gradient says.
       const Eigen::Vector2d gradient = b.J_ray_px.transpose() * tau.cross(a.ray_ref);
       if (gradient.squaredNorm() > 0.0) {

@@ -65,6 +65,7 @@ SymmetricTransfer::SymmetricTransfer(std::shared_ptr<const PairMeasurement> pair
     : pair_(std::move(pair)) {
   CHECK_GT(pair_->sigma_px, 0.0);
   CHECK_GE(pair_->rate_times_s.size(), 2u);
+  CHECK(pair_->effects == nullptr);
   set_num_residuals(kResidualsPerMatch * static_cast<int>(pair_->matches.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4};
   for (size_t g = 0; g < pair_->rate_group_sizes.size(); ++g) {
@@ -115,6 +116,30 @@ bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residu
     }
   }
   return true;
+}
+
+std::vector<double> SymmetricTransfer::IndependentResiduals(double const* const* parameters) const {
+  auto without_loss = std::make_shared<PairMeasurement>(*pair_);
+  without_loss->robust_threshold = 0.0;
+  const SymmetricTransfer plain(without_loss);
+  std::vector<double> four(static_cast<size_t>(num_residuals()));
+  if (!plain.Evaluate(parameters, four.data(), nullptr)) return {};
+  std::vector<double> two;
+  two.reserve(four.size() / 2);
+  for (size_t i = 0; i < four.size(); i += kResidualsPerMatch) {
+    const Eigen::Map<const Eigen::Vector4d> r(&four[i]);
+    const double e_b = r.head<2>().norm();
+    const double scale = e_b > 0.0 ? r.norm() / e_b : 1.0;
+    two.push_back(scale * r[0]);
+    two.push_back(scale * r[1]);
+  }
+  return two;
+}
+
+bool HasTransfer(const Lens& model, const LensParameters& lens, const Bearing& a,
+                 const Bearing& b) {
+  Transfer into_a, into_b;
+  return into_b.Compute(model, lens, a, b, true) && into_a.Compute(model, lens, b, a, true);
 }
 
 }  // namespace camgyro

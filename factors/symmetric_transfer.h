@@ -5,6 +5,7 @@
 #include <ceres/cost_function.h>
 
 #include <memory>
+#include <vector>
 
 #include "factors/pair_bearings.h"
 
@@ -26,7 +27,7 @@ namespace camgyro {
 // Valid       while every pixel has a ray and its transfer a pixel; otherwise the step is rejected.
 //             Neglects translation: it is for comparison, and for scenes so far away that parallax
 //             does not show. Also neglects: that noise in v moves the row's time; local scale of
-//             the transfer
+//             the transfer, and effects (CHECKed)
 // Source      Ovren & Forssen, Gyroscope-based video stabilisation with auto-calibration, ICRA 2015
 class SymmetricTransfer final : public ceres::CostFunction {
  public:
@@ -35,12 +36,20 @@ class SymmetricTransfer final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
+  // What is independent in the four residuals of each match, without loss: two in the direction of
+  // e_b, as long as the four. Unit variance, to first order. Empty where Evaluate fails.
+  std::vector<double> IndependentResiduals(double const* const* parameters) const;
+
   static constexpr int kFirstRateGroup = 3;
   static constexpr int kResidualsPerMatch = 4;
 
  private:
   const std::shared_ptr<const PairMeasurement> pair_;
 };
+
+// Whether a match has a residual: its transfer has a pixel both ways.
+[[nodiscard]] bool HasTransfer(const Lens& model, const LensParameters& lens, const Bearing& a,
+                               const Bearing& b);
 
 }  // namespace camgyro
 

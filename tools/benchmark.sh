@@ -2,8 +2,11 @@
 # tools/benchmark.sh [CAMGYRO]: runs the benchmark and writes docs/benchmark.md, with the text of
 # docs/benchmark_notes.md in front, and docs/benchmark_*.svg. SEEDS: runs per scenario (8); JOBS:
 # processes at a time (all cores). The measured recordings are in $CAMGYRO_DATA (../shared/data).
+# tools/benchmark.sh --residuals [CAMGYRO]: only the section of that name, anew in docs/benchmark.md.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+only=
+if [[ ${1:-} == --residuals ]]; then only=residuals; shift; fi
 camgyro=$(realpath "${1:-build/release/tools/camgyro}")
 data=${CAMGYRO_DATA:-../shared/data}
 seeds=${SEEDS:-8} jobs=${JOBS:-$(nproc)}
@@ -15,6 +18,60 @@ compare() {  # arguments of `camgyro compare`, which become the section's comman
   printf '    camgyro compare %s\n\n' "$*"
   cat "$work/out/compare.md"
 }
+
+# One table of all residuals, with and without loss, from 12 comparisons.
+residuals() {
+  local motions=(walking running rotation) wrong=tracks.outlier_fraction=0.05
+  local options=(--seeds=4 tracks.noise_px=0.5 --estimators=refinement)
+  local -A no_loss=([robust]='' [norobust]=', no loss')
+  local residual loss outliers
+  printf '    camgyro compare %s %s\n\n' "${motions[*]}" "${options[*]}"
+  cat <<EOF
+with \`--residual\` and the loss as in the rows; the last three columns with \`$wrong\`: an observation in 20, a match in 10 is wrong, by 20 px per axis. In the cells, of the refinement: RMSE of f [px], RMSE of t_d [ms]; NEES/dof.
+
+EOF
+  printf '| |'
+  printf ' %s |' "${motions[@]}" "${motions[@]/%/, 10 % wrong}"
+  printf '\n| --- | --- | --- | --- | --- | --- | --- |\n'
+  for residual in plane determinant transfer; do
+    for loss in robust norobust; do
+      printf '| %s%s |' "$residual" "${no_loss[$loss]}"
+      for outliers in "" "$wrong"; do
+        # shellcheck disable=SC2086
+        "$camgyro" compare "${motions[@]}" "${options[@]}" --residual="$residual" --"$loss" \
+          $outliers --jobs="$jobs" --out="$work/out" >&2
+        # A cell per case. Runs that failed are in no number, but counted.
+        awk '
+          function value(key, scale) {
+            match($0, key ": [^,}]*")
+            return short(scale * substr($0, RSTART + length(key) + 2, RLENGTH - length(key) - 2))
+          }
+          function short(x) { return sprintf(x < 1000 ? "%.3g" : "%.0f", x) }
+          function cell() {
+            return " " (f == "" ? "-" : f ", " t "; " nees) (failed ? " (" failed " failed)" : "") " |"
+          }
+          /- name:/ { if (seen++) printf "%s", cell(); f = "" }
+          /failed:/ { failed = $2 + 0 }
+          /nees_per_dof:/ { nees = value("mean", 1) }
+          /focal_px:/ { f = value("rmse", 1) }
+          /delay_s:/ { t = value("rmse", 1e3) }
+          END { printf "%s", cell() }' "$work/out/compare.yaml"
+      done
+      printf '\n'
+    done
+  done
+  printf '\n'
+}
+
+if [[ $only == residuals ]]; then
+  { printf '## Residuals, with and without loss\n'; residuals; } > "$work/section.md"
+  awk -v section="$work/section.md" '
+    /^## / { skip = 0 }
+    /^## Residuals, with/ { skip = 1; while ((getline line < section) > 0) print line }
+    !skip' docs/benchmark.md > "$work/benchmark.md"
+  mv "$work/benchmark.md" docs/benchmark.md
+  exit
+fi
 
 {
   cat docs/benchmark_notes.md
@@ -32,6 +89,8 @@ compare() {  # arguments of `camgyro compare`, which become the section's comman
     compare walking running --seeds="$seeds" tracks.noise_px=0.5 --ekf_sigma_px=0.5 \
       --estimators=ekf "$options"
   done
+  printf '## Residuals, with and without loss\n'
+  residuals
   if [[ -d $data ]]; then
     printf '## OpenVINS simulation, lens given\n'
     (cd "$data" && compare ov_handheld_gs ov_handheld_rs ov_handheld_rs_skew)

@@ -7,6 +7,7 @@
 #include "estimator/calibrate.h"
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "tools/commands.h"
+#include "tools/fit_flags.h"
 #include "tools/recording_input.h"
 #include "tools/report/calibrate_report.h"
 #include "tools/result_files.h"
@@ -18,7 +19,6 @@ DEFINE_string(out, "",
               ".mkv");
 DEFINE_string(estimator, "window",
               "online estimator: window, or ekf, the filter of the paper, without refinement");
-DEFINE_string(residual, "plane", "image residual: plane, or determinant as in the paper");
 DEFINE_bool(refine, true,
             "skip the last step, all frames in one problem: the online estimate is the result");
 DEFINE_string(effects, "",
@@ -35,10 +35,12 @@ Result<CalibrateOptions> OptionsFromFlags() {
   if (FLAGS_estimator != "window" && FLAGS_estimator != "ekf") {
     return BadUsage("--estimator=" + FLAGS_estimator + ": expected window or ekf");
   }
-  if (FLAGS_residual == "determinant") {
-    options.residual = ResidualKind::kDeterminant;
-  } else if (FLAGS_residual != "plane") {
-    return BadUsage("--residual=" + FLAGS_residual + ": expected plane or determinant");
+  if (Status read = ReadFitFlags(&options.window.graph); !read) {
+    return tl::unexpected(read.error());
+  }
+  options.residual = options.window.graph.residual;
+  if (options.residual == ResidualKind::kSymmetricTransfer && !FLAGS_effects.empty()) {
+    return BadUsage("--effects=" + FLAGS_effects + ": expected none with --residual=transfer");
   }
   if (!(FLAGS_search_s > 0.0)) return BadUsage("--search_s: expected a positive number");
   options.start.search_s = FLAGS_search_s;
@@ -115,7 +117,9 @@ Command CalibrateCommand() {
   command.summary =
       "focal length, readout time, delay, mounting and gyro bias: with their uncertainty, into "
       "calibration.yaml (trace.csv: the online estimate over time; delay.csv: the delay search)";
-  command.flags = {"out", "effects", "residual", "estimator", "refine"};
+  command.flags = {"out", "effects"};
+  for (const std::string& name : FitFlags()) command.flags.push_back(name);
+  command.flags.insert(command.flags.end(), {"estimator", "refine"});
   for (const std::string& name : GuessFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"search_s", "quiet"});
   command.run = RunCalibrate;

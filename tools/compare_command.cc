@@ -11,6 +11,7 @@
 #include "tools/comparison/error_plot.h"
 #include "tools/comparison/information_bound.h"
 #include "tools/comparison/processes.h"
+#include "tools/fit_flags.h"
 #include "tools/progress_bar.h"
 #include "tools/report/page.h"
 #include "tools/result_files.h"
@@ -45,6 +46,7 @@ namespace {
 struct Plan {
   std::vector<std::string> estimators;
   std::vector<Case> cases;
+  PairGraphOptions graph;
   EkfOptions ekf;
   int jobs = 1;
 };
@@ -73,6 +75,7 @@ Status ReadFlags(Plan* plan) {
       return BadUsage("--estimators: `" + name + "`: expected window, refinement or ekf");
     }
   }
+  if (Status read = ReadFitFlags(&plan->graph); !read) return read;
   if (FLAGS_seeds < 1) return BadUsage("--seeds: expected 1 or more");
   if (FLAGS_jobs < 0) return BadUsage("--jobs: expected 1 or more");
   if (FLAGS_ekf_triplets < 1) return BadUsage("--ekf_triplets: expected 1 or more");
@@ -123,7 +126,7 @@ Result<std::string> RunSeed(const Plan& plan, const Case& from, uint64_t seed) {
   const Result<Input> input = comparison::MakeInput(from, seed, *start);
   if (!input) return tl::unexpected(input.error());
   SeedRun run;
-  run.estimators = comparison::RunEstimators(plan.estimators, *input, plan.ekf);
+  run.estimators = comparison::RunEstimators(plan.estimators, *input, plan.graph, plan.ekf);
   if (from.scenario) {
     run.bound = comparison::InformationBound(
         input->exact_matches, input->recording, input->truth, input->prior.prior_sigma,
@@ -222,8 +225,11 @@ Command CompareCommand() {
       "window, refinement and the paper's filter against the truth: tables and plots (CASE: a "
       "recording with truth.yaml; a scenario file; or the name of a motion: handheld, walking, "
       "running, panning, rotation, single_axis, slow. KEY=VALUE: section.key of the scenarios)";
-  command.flags = {"out",          "estimators",   "seeds",    "jobs",           "start", "truth",
-                   "ekf_triplets", "ekf_sigma_px", "ekf_gate", "ekf_iterations", "quiet"};
+  command.flags = {"out", "estimators"};
+  for (const std::string& name : FitFlags()) command.flags.push_back(name);
+  command.flags.insert(command.flags.end(),
+                       {"seeds", "jobs", "start", "truth", "ekf_triplets", "ekf_sigma_px",
+                        "ekf_gate", "ekf_iterations", "quiet"});
   command.run = RunCompare;
   return command;
 }

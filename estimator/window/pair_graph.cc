@@ -16,6 +16,7 @@
 #include "factors/marginal_prior.h"
 #include "factors/relative_rotation.h"
 #include "factors/robust.h"
+#include "factors/symmetric_transfer.h"
 
 namespace camgyro {
 namespace {
@@ -288,6 +289,9 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   m.sigma_px = options_.sigma_px;
   m.noise = options_.match_noise;
   m.robust_threshold = options_.robust_threshold;
+  if (options_.residual == ResidualKind::kSymmetricTransfer && !KeepTransferable(&pair)) {
+    return AddPairResult::kTooFewMatches;
+  }
 
   std::vector<BlockId> blocks = {kLensBlock, kShutterBlock, kRotationBlock};
   if (options_.residual == ResidualKind::kPlane) {
@@ -305,6 +309,8 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
   if (options_.residual == ResidualKind::kPlane) {
     pair.factor = graph_.AddFactor(std::make_shared<CoplanarityPlane>(pair.measurement), blocks);
+  } else if (options_.residual == ResidualKind::kSymmetricTransfer) {
+    pair.factor = graph_.AddFactor(std::make_shared<SymmetricTransfer>(pair.measurement), blocks);
   } else {
     const int count = static_cast<int>(m.matches.size());
     pair.factor = graph_.AddFactor(
@@ -315,6 +321,25 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   pairs_.emplace(id, std::move(pair));
   if (options_.residual == ResidualKind::kPlane) Residuals(id, /*search=*/true);
   return AddPairResult::kAdded;
+}
+
+bool PairGraph::KeepTransferable(Pair* pair) const {
+  PairMeasurement& m = *pair->measurement;
+  std::vector<const double*> groups;
+  for (const int64_t group : pair->groups) groups.push_back(graph_.value(RatesBlock(group)).data());
+  const RotationChain chain(m.rate_times_s, GatherRates(m, groups.data()));
+  const LensParameters lens = graph_.value(kLensBlock);
+  PairBearings bearings;
+  if (!EvaluatePairBearings(m, chain, lens.data(), graph_.value(kShutterBlock).data(),
+                            graph_.value(kRotationBlock).data(), nullptr, false, &bearings)) {
+    return false;
+  }
+  std::vector<Match> kept;
+  for (size_t i = 0; i < m.matches.size(); ++i) {
+    if (HasTransfer(*m.lens, lens, bearings.a[i], bearings.b[i])) kept.push_back(m.matches[i]);
+  }
+  m.matches = std::move(kept);
+  return static_cast<int>(m.matches.size()) >= kMinMatches;
 }
 
 AddPairResult PairGraph::AddRotation(int64_t id, const FrameTime& frame_a, const FrameTime& frame_b,
@@ -411,6 +436,13 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const PairMeasurement& m = *pair.measurement;
   std::vector<const double*> groups;
   for (const int64_t group : pair.groups) groups.push_back(graph_.value(RatesBlock(group)).data());
+  if (options_.residual == ResidualKind::kSymmetricTransfer) {
+    std::vector<const double*> p = {graph_.value(kLensBlock).data(),
+                                    graph_.value(kShutterBlock).data(),
+                                    graph_.value(kRotationBlock).data()};
+    p.insert(p.end(), groups.begin(), groups.end());
+    return SymmetricTransfer(pair.measurement).IndependentResiduals(p.data());
+  }
   const RotationChain chain(m.rate_times_s, GatherRates(m, groups.data()));
   PairBearings bearings;
   if (!EvaluatePairBearings(m, chain, graph_.value(kLensBlock).data(),

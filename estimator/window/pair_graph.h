@@ -19,13 +19,28 @@
 
 namespace camgyro {
 
-enum class ResidualKind { kPlane, kDeterminant };
+// CoplanarityPlane, CoplanarityDeterminant (as in the paper), or SymmetricTransfer, which neglects
+// translation and knows no effects.
+enum class ResidualKind { kPlane, kDeterminant, kSymmetricTransfer };
+
+// What PairGraph::Residuals holds.
+struct ResidualCounts {
+  int per_match = 1;
+  // Degrees of freedom that a pair's own direction and its turn take; the rest of the turn lies
+  // along the direction, where it changes nothing.
+  int lost_per_pair = 4;
+};
+inline ResidualCounts CountsOf(ResidualKind kind) {
+  return kind == ResidualKind::kSymmetricTransfer ? ResidualCounts{2, 0} : ResidualCounts{};
+}
 
 struct PairGraphOptions {
   ResidualKind residual = ResidualKind::kPlane;
   MatchNoise match_noise = MatchNoise::kBothImages;
   double sigma_px = 1.0;          // of the pairs added from now on
   double robust_threshold = 2.5;  // in sigmas; 0: none
+  // Within so many sigmas a match counts as an inlier, also without loss.
+  double inlier_sigmas() const { return robust_threshold > 0.0 ? robust_threshold : 2.5; }
   // Prior of the bend of the path: how fast the direction of motion changes [rad/s].
   double turn_sigma_rad_s = 4.0;
   // White noise of one gyro sample per axis (Jia & Evans section V.C); see GyroSigma.
@@ -58,9 +73,6 @@ enum class AddPairResult {
 class PairGraph {
  public:
   static constexpr int kMinMatches = 8;
-  // Degrees of freedom that a pair's own direction and its turn take; the rest of the turn lies
-  // along the direction, where it changes nothing.
-  static constexpr int kLostPerPair = 4;
 
   // start: values with effects, and prior_sigma as the standard deviations of a Gaussian prior
   // around `prior_mean` (zero bias, guess of the files, no effects, ...).
@@ -69,7 +81,7 @@ class PairGraph {
 
   // Samples in time order (CHECKed).
   void AddRate(const TimedRate& rate);
-  // Adds the coplanarity of a pair; pairs come in the order of their first frame. Times are
+  // Adds the matches of a pair; pairs come in the order of their first frame. Times are
   // recorded stamps in seconds from the graph's origin.
   AddPairResult AddPair(int64_t id, const FrameTime& frame_a, const FrameTime& frame_b,
                         const std::vector<Match>& matches);
@@ -87,8 +99,9 @@ class PairGraph {
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
   std::vector<int64_t> pair_ids() const;
 
-  // Whitened residuals of a pair at the present estimate, without loss. With `search`, its
-  // direction is first searched anew, and stored if it is better. Empty if a ray is missing.
+  // Whitened independent residuals of a pair at the present estimate, without loss (CountsOf; three
+  // of a rotation). With `search`, its direction is first searched anew, and stored if it is
+  // better. Empty if a ray is missing.
   std::vector<double> Residuals(int64_t id, bool search);
   // Sets the noise of a pair already in the graph: pixels, or radians of a rotation.
   void SetSigma(int64_t id, double sigma);
@@ -129,6 +142,8 @@ class PairGraph {
   // Makes the rate groups that cover [from_s, to_s] on the gyro clock; fills their ids.
   AddPairResult CoverWithRates(double from_s, double to_s, int step, std::vector<int64_t>* groups,
                                std::vector<double>* times, std::vector<int>* sizes);
+  // Drops the matches without a transfer: a pair is solved as a whole. False if too few are left.
+  [[nodiscard]] bool KeepTransferable(Pair* pair) const;
   // Samples per value of the rates of pairs with pixels.
   int RateStep() const;
   void AddBias(int64_t index);

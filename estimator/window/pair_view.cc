@@ -1,11 +1,14 @@
 #include "estimator/window/pair_view.h"
 
+#include <glog/logging.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/window/direction_search.h"
 #include "factors/robust.h"
+#include "factors/symmetric_transfer.h"
 
 namespace camgyro {
 
@@ -51,6 +54,17 @@ PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i)
   const double share = CoplanarityPlane::RowShare(m, m.matches[i]);
   return EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
                                plane.tau + share * plane.turn, m.variance_a(), m.variance_b());
+}
+
+std::vector<double> TransferResiduals(const PairView& view, const Calibration& calibration) {
+  const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);
+  const double* const parameters[] = {calibration.lens.data(), shutter.data(),
+                                      calibration.q_gyro_cam.coeffs().data(), view.rates.data()};
+  std::vector<double> residuals =
+      SymmetricTransfer(std::make_shared<const PairMeasurement>(view.measurement))
+          .IndependentResiduals(parameters);
+  CHECK_EQ(residuals.size(), 2 * view.measurement.matches.size());  // ViewPair kept no others
+  return residuals;
 }
 
 PairPlane FitPlane(const PairView& view, size_t first, size_t step) {
@@ -128,7 +142,9 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
     if (EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, m.frame_a, m.size_px,
                         match.px_a, calibration.pair_effects(), &a) &&
         EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, m.frame_b, m.size_px,
-                        match.px_b, calibration.pair_effects(), &b)) {
+                        match.px_b, calibration.pair_effects(), &b) &&
+        (options.residual != ResidualKind::kSymmetricTransfer ||
+         HasTransfer(*m.lens, calibration.lens, a, b))) {
       b.ScaleNoise(match.noise_factor_b);
       m.matches.push_back(match);
       view->bearings.a.push_back(a);

@@ -3,6 +3,7 @@
 #define CAMGYRO_ESTIMATOR_WINDOW_PAIR_VIEW_H_
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "core/calibration.h"
 #include "estimator/window/estimation_input.h"
@@ -12,7 +13,7 @@
 namespace camgyro {
 
 struct PairView {
-  PairMeasurement measurement;  // those matches that have rays; rates in one group
+  PairMeasurement measurement;  // those matches that have a residual; rates in one group
   Eigen::Matrix3Xd rates;       // readings less bias and effects [rad/s]
   PairBearings bearings;        // with derivatives
   double turn_sigma_rad = 0.0;  // prior of the turn
@@ -38,6 +39,10 @@ struct PairPlane {
 PairPlane FitPlane(const PairView& view, size_t first = 0, size_t step = 1);
 // Of match i, in sigmas, without loss.
 PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i);
+
+// Of a view made for ResidualKind::kSymmetricTransfer: SymmetricTransfer::IndependentResiduals, two
+// per match. calibration: that of the view.
+std::vector<double> TransferResiduals(const PairView& view, const Calibration& calibration);
 
 // The samples that a pair needs, and one beyond on both sides; false where there are none, or a
 // gap is longer than 5 median intervals and 30 ms.

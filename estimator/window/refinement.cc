@@ -1,5 +1,6 @@
 #include "estimator/window/refinement.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -28,6 +29,33 @@ double LargestShift(const std::vector<TimedPair>& pairs, const Calibration& a,
   return largest;
 }
 
+// How well matches fit.
+class FitSum {
+ public:
+  FitSum(const PairGraphOptions& options, int per_match)
+      : options_(options), per_match_(per_match) {}
+  // Independent residuals of some matches, in sigmas, without loss.
+  void Add(const std::vector<double>& residuals) {
+    for (size_t i = 0; i < residuals.size(); i += static_cast<size_t>(per_match_)) {
+      const double length = Eigen::Map<const Eigen::VectorXd>(&residuals[i], per_match_).norm();
+      const double bounded = Robustify(length, options_.robust_threshold).value;
+      sum_sq_ += bounded * bounded;
+      inliers_ += length <= options_.inlier_sigmas() ? 1 : 0;
+      ++matches_;
+    }
+  }
+  int matches() const { return matches_; }
+  // Per residual.
+  double rms() const { return std::sqrt(sum_sq_ / std::max(1, per_match_ * matches_)); }
+  double inlier_ratio() const { return static_cast<double>(inliers_) / std::max(1, matches_); }
+
+ private:
+  const PairGraphOptions& options_;
+  const int per_match_;
+  double sum_sq_ = 0.0;
+  int inliers_ = 0, matches_ = 0;
+};
+
 }  // namespace
 
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
@@ -37,7 +65,8 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
   result.calibration = start;
   PairGraphOptions graph_options = options.graph;
   const bool rotations = !pairs.empty() && pairs.front().matches.empty();
-  const int lost = rotations ? 0 : PairGraph::kLostPerPair;
+  const ResidualCounts counts = rotations ? ResidualCounts{1, 0} : CountsOf(graph_options.residual);
+  const int lost = counts.lost_per_pair;
   std::unique_ptr<PairGraph> graph;
   std::vector<int64_t> ids;
   const auto all_residuals = [&](bool search) {
@@ -110,18 +139,11 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     q = FitQuality();
     q.pairs = graph->num_pairs();
     q.noise_px = scale;
-    double sum_sq = 0.0;
-    int inliers = 0;
-    for (const auto& pair : residuals) {
-      for (const double r : pair) {
-        const double bounded = Robustify(r, graph_options.robust_threshold).value;
-        sum_sq += bounded * bounded;
-        inliers += std::abs(r) <= graph_options.robust_threshold ? 1 : 0;
-        ++q.matches;
-      }
-    }
-    q.rms_px = scale * std::sqrt(sum_sq / std::max(1, q.matches));
-    q.inlier_ratio = static_cast<double>(inliers) / std::max(1, q.matches);
+    FitSum sum(graph_options, counts.per_match);
+    for (const auto& pair : residuals) sum.Add(pair);
+    q.matches = sum.matches();
+    q.rms_px = scale * sum.rms();
+    q.inlier_ratio = sum.inlier_ratio();
     result.converged = (moved.cwiseAbs().array() < 0.3 * result.calibration.sigma().array()).all();
     if (result.converged) break;
   }
@@ -132,21 +154,25 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
                          const Calibration& calibration, double noise_px,
                          const PairGraphOptions& options) {
   UnseenFit fit;
-  double sum_sq = 0.0;
+  FitSum sum(options, CountsOf(options.residual).per_match);
   PairView view;
   for (const TimedPair& pair : pairs) {
     if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
     if (view.bearings.a.size() < PairGraph::kMinMatches) continue;
     ++fit.pairs;
-    const PairPlane plane = FitPlane(view, 0, 2);
-    for (size_t i = 1; i < view.bearings.a.size(); i += 2) {
-      const double bounded =
-          Robustify(ResidualOf(view, plane, i).value, options.robust_threshold).value;
-      sum_sq += bounded * bounded;
-      ++fit.matches;
+    if (options.residual == ResidualKind::kSymmetricTransfer) {
+      sum.Add(TransferResiduals(view, calibration));
+      continue;
     }
+    const PairPlane plane = FitPlane(view, 0, 2);
+    std::vector<double> residuals;
+    for (size_t i = 1; i < view.bearings.a.size(); i += 2) {
+      residuals.push_back(ResidualOf(view, plane, i).value);
+    }
+    sum.Add(residuals);
   }
-  fit.rms_px = noise_px * std::sqrt(sum_sq / std::max(1, fit.matches));
+  fit.matches = sum.matches();
+  fit.rms_px = noise_px * sum.rms();
   return fit;
 }
 

@@ -23,7 +23,7 @@ struct RefinementOptions {
 struct FitQuality {
   int pairs = 0;              // used
   int matches = 0;            // in them
-  double inlier_ratio = 0.0;  // share of matches within the robust threshold
+  double inlier_ratio = 0.0;  // share of matches within PairGraphOptions::inlier_sigmas
   double noise_px = 0.0;      // robust standard deviation per axis (attitudes: rad)
   double rms_px = 0.0;        // of residuals, each bounded by the loss
 };
@@ -43,7 +43,8 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
                        const RefinementOptions& options);
 
 // Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
-// direction of each pair from every other match, residuals from the rest.
+// direction of each pair from every other match, residuals from the rest. A transfer has no
+// direction: residuals from all matches.
 struct UnseenFit {
   int pairs = 0;
   int matches = 0;

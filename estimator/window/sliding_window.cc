@@ -100,7 +100,8 @@ void SlidingWindow::UpdateNoise() {
   std::vector<std::vector<double>> residuals;
   const std::vector<int64_t> ids = graph_.pair_ids();
   for (const int64_t id : ids) residuals.push_back(graph_.Residuals(id, /*search=*/false));
-  const double relative = std::max(1e-3, RobustScale(residuals, PairGraph::kLostPerPair));
+  const double relative =
+      std::max(1e-3, RobustScale(residuals, CountsOf(options_.graph.residual).lost_per_pair));
   // A settled window holds few pairs: its scale is averaged over time.
   noise_px_ *= settled_ ? std::pow(relative, 0.1) : relative;
   graph_.options()->sigma_px = noise_px_;

@@ -64,6 +64,34 @@ TEST_F(CompareTest, RunsScenariosAndWritesTablesAndPlots) {
   EXPECT_EQ(rows, 1 + 3 * 3);
 }
 
+// Where only the camera turns, transfers are right; where it moves, they are not. Without loss,
+// wrong matches show.
+TEST_F(CompareTest, RunsTheResidualAndTheLossThatAreAsked) {
+  WriteScenario("small.yaml");
+  const auto focal_error = [&](const std::string& arguments) {
+    const RunResult run =
+        Run("compare small.yaml --estimators=window,refinement --seeds=2 --out=c " + arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    const YAML::Node all = YAML::LoadFile(Path("c/compare.yaml"))["cases"][0]["estimators"];
+    return Eigen::Vector2d(all[0]["parameters"]["focal_px"]["rmse"].as<double>(),
+                           all[1]["parameters"]["focal_px"]["rmse"].as<double>());
+  };
+  const std::string turning = "motion.kind=rotation ";
+  for (const char* residual : {"plane", "determinant", "transfer"}) {
+    SCOPED_TRACE(residual);
+    const std::string flag = std::string(" --residual=") + residual;
+    const Eigen::Vector2d turns = focal_error(turning + flag), moves = focal_error(flag);
+    EXPECT_LT(turns.maxCoeff(), 1.5);
+    if (residual == std::string("transfer")) {
+      EXPECT_GT(moves.minCoeff(), 3.0);
+    } else {
+      EXPECT_LT(moves.maxCoeff(), 1.5);
+    }
+  }
+  const std::string wrong = "tracks.outlier_fraction=0.05 ";
+  EXPECT_GT(focal_error(wrong + "--norobust").minCoeff(), 3.0 * focal_error(wrong).maxCoeff());
+}
+
 TEST_F(CompareTest, RunsRecordingsFromWhatTheyDeclare) {
   Simulate(kSmall, "a");
   std::filesystem::rename(Path("a/truth.yaml"), Path("truth.yaml"));
@@ -105,6 +133,7 @@ TEST_F(CompareTest, BadUsageIsTwoAndSaysWhat) {
       {"compare walking walking", "`walking` is given twice"},
       {"compare walking --seeds=0", "--seeds: expected 1 or more"},
       {"compare walking --estimators=window,kalman", "`kalman`: expected window, refinement"},
+      {"compare walking --residual=point", "expected plane, determinant or transfer"},
       {"compare walking --start=here", "expected auto, drawn, declared or found"},
       {"compare walking --ekf_sigma_px=0", "--ekf_sigma_px: expected a positive number"},
       {"compare walking --ekf_triplets=0", "--ekf_triplets: expected 1 or more"},

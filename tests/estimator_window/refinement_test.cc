@@ -24,8 +24,7 @@ Result<Refined> RefineFromOffTheTruth(const Simulated& s, const EstimationInput&
 }
 
 // A scenario of which this share of the matches is wrong: both observations must be right.
-Simulated WithWrongMatches(double duration_s, double share) {
-  Scenario scenario = ShortScenario(duration_s);
+Simulated WithWrongMatches(Scenario scenario, double share) {
   scenario.tracks.outlier_fraction = 1.0 - std::sqrt(1.0 - share);
   return SimulateTracks(scenario).value();
 }
@@ -33,7 +32,7 @@ Simulated WithWrongMatches(double duration_s, double share) {
 TEST(Refinement, RecoversTheTruth) {
   for (const double wrong : {0.0, 0.02}) {
     SCOPED_TRACE(wrong);
-    const Simulated s = WithWrongMatches(4.0, wrong);
+    const Simulated s = WithWrongMatches(ShortScenario(4.0), wrong);
     const EstimationInput input = MakeEstimationInput(s.recording);
     const Result<Refined> refined = RefineFromOffTheTruth(s, input);
     ASSERT_TRUE(refined.has_value()) << refined.error().message;
@@ -54,7 +53,7 @@ TEST(Refinement, RecoversTheTruth) {
 // What the frontend did not reject is bent by the loss, not removed. The calibration stays close,
 // but its sigmas do not cover what wrong matches do: with 15 % of them b_g errs by 18 sigma.
 TEST(Refinement, StaysCloseWithManyWrongMatches) {
-  const Simulated s = WithWrongMatches(4.0, 0.15);
+  const Simulated s = WithWrongMatches(ShortScenario(4.0), 0.15);
   const EstimationInput input = MakeEstimationInput(s.recording);
   const Result<Refined> refined = RefineFromOffTheTruth(s, input);
   ASSERT_TRUE(refined.has_value()) << refined.error().message;
@@ -66,6 +65,100 @@ TEST(Refinement, StaysCloseWithManyWrongMatches) {
   EXPECT_LT(error.segment<3>(kStateBias).norm(), 0.05);
   RecordProperty("error_in_sigmas",
                  ::testing::PrintToString(ErrorInSigmas(refined->calibration, s.truth)));
+}
+
+// Two of its four residuals per match count: with all of them the sigmas would be too small and
+// the noise wrong. Near scenes show that it is the transfer that was fitted.
+TEST(Refinement, TransferRecoversTheTruthOfAFarSceneOnly) {
+  RefinementOptions options;
+  options.graph.residual = ResidualKind::kSymmetricTransfer;
+  Simulated s = SimulateTracks(FarScenario(4.0)).value();
+  EstimationInput input = MakeEstimationInput(s.recording);
+  Calibration start = StartOffTheTruth(s.truth);
+  const Result<Refined> far = Refine(input, input.pairs, start, start, options);
+  ASSERT_TRUE(far.has_value()) << far.error().message;
+  EXPECT_TRUE(far->converged);
+  EXPECT_EQ(far->quality.pairs, 120);
+  size_t matches = 0;
+  for (const TimedPair& pair : input.pairs) matches += pair.matches.size();
+  EXPECT_EQ(far->quality.matches, static_cast<int>(matches));
+  EXPECT_NEAR(far->quality.noise_px, 0.7, 0.03);
+  // A length of two Gaussians is within 2.5 sigma with 1 - exp(-2.5^2 / 2).
+  EXPECT_NEAR(far->quality.inlier_ratio, 0.956, 0.015);
+  EXPECT_NEAR(far->quality.rms_px, 0.7, 0.03);
+  const StateVector error = ErrorInSigmas(far->calibration, s.truth);
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 4.0) << error.transpose();
+  EXPECT_GT(error.squaredNorm(), 2.0);  // chi-square, 11 degrees: 0.2 %
+  EXPECT_LT(far->calibration.sigma()[kStateFocal], 3.0);
+
+  // No direction takes degrees of freedom: with four lost of 20, the noise would be 12 % larger.
+  for (TimedPair& pair : input.pairs) pair.matches.resize(10);
+  const Result<Refined> few = Refine(input, input.pairs, start, start, options);
+  ASSERT_TRUE(few.has_value()) << few.error().message;
+  EXPECT_NEAR(few->quality.noise_px, 0.7, 0.04);
+
+  s = SimulateTracks(ShortScenario(4.0)).value();
+  input = MakeEstimationInput(s.recording);
+  start = StartOffTheTruth(s.truth);
+  const Result<Refined> near = Refine(input, input.pairs, start, start, options);
+  ASSERT_TRUE(near.has_value()) << near.error().message;
+  EXPECT_GT(near->quality.noise_px, 1.0);  // parallax of the median match
+  EXPECT_GT(ErrorInSigmas(near->calibration, s.truth).cwiseAbs().maxCoeff(), 10.0);
+}
+
+// What has no transfer is left out when a pair is added: one wrong match of a fast turn, by 80 deg
+// here, must not stop the whole fit.
+TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
+  Calibration start;
+  start.width_px = 640;
+  start.height_px = 480;
+  start.lens = MakePinhole(500.0, {319.5, 239.5});
+  start.prior_sigma.setOnes();
+  PairGraphOptions options;
+  options.residual = ResidualKind::kSymmetricTransfer;
+  const auto residuals_of = [&](int wrong) {
+    PairGraph graph(start, start, options);
+    for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {42.0, 0.0, 0.0}});
+    std::vector<Match> matches;
+    for (int i = 0; i < 10; ++i) matches.push_back({{60.0 * i, 239.5}, {60.0 * i, 239.5}});
+    // The camera turns up: what was 25 deg below its axis is 105 deg below it.
+    for (int i = 0; i < wrong; ++i) {
+      matches[static_cast<size_t>(i)].px_a.y() = 475.0;
+      matches[static_cast<size_t>(i)].px_b.y() = 5.0;
+    }
+    const AddPairResult added = graph.AddPair(0, {0.2}, {0.2 + 1.0 / 30.0}, matches);
+    if (added != AddPairResult::kAdded) return -1;
+    return static_cast<int>(graph.Residuals(0, false).size());
+  };
+  EXPECT_EQ(residuals_of(0), 20);
+  EXPECT_EQ(residuals_of(2), 16);
+  EXPECT_EQ(residuals_of(3), -1);  // fewer than 8 left
+}
+
+// Without loss the same wrong matches pull the calibration away; they are counted all the same.
+TEST(Refinement, WithoutLossWrongMatchesPull) {
+  for (const ResidualKind kind : {ResidualKind::kPlane, ResidualKind::kSymmetricTransfer}) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    const bool far = kind == ResidualKind::kSymmetricTransfer;
+    const Simulated s = WithWrongMatches(far ? FarScenario(4.0) : ShortScenario(4.0), 0.05);
+    const EstimationInput input = MakeEstimationInput(s.recording);
+    const Calibration start = StartOffTheTruth(s.truth);
+    RefinementOptions options;
+    options.graph.residual = kind;
+    const Result<Refined> robust = Refine(input, input.pairs, start, start, options);
+    options.graph.robust_threshold = 0.0;
+    const Result<Refined> plain = Refine(input, input.pairs, start, start, options);
+    ASSERT_TRUE(robust.has_value()) << robust.error().message;
+    ASSERT_TRUE(plain.has_value()) << plain.error().message;
+    const StateVector sigma = robust->calibration.sigma();
+    const auto error = [&](const Result<Refined>& fit) {
+      return Difference(fit->calibration, s.truth).cwiseQuotient(sigma).norm();
+    };
+    EXPECT_GT(error(plain), 3.0 * error(robust));
+    EXPECT_GT(plain->quality.inlier_ratio, 0.5);
+    EXPECT_LT(plain->quality.inlier_ratio, 0.97);
+    EXPECT_GT(plain->quality.rms_px, 1.5 * robust->quality.rms_px);
+  }
 }
 
 TEST(Refinement, FewerThanTenPairsAreRefused) {
@@ -108,6 +201,22 @@ TEST(EvaluateUnseen, IsTheNoiseAtTheTruthAndMoreElsewhere) {
   EstimationInput late = input;
   late.rates.erase(late.rates.begin(), late.rates.begin() + 500);  // 2.5 s, of which 0.5 before
   EXPECT_NEAR(EvaluateUnseen(late, input.pairs, s.truth, 0.7, {}).pairs, 60, 2);
+}
+
+TEST(EvaluateUnseen, OfTransfersIsTheNoiseAtTheTruthAndMoreElsewhere) {
+  const Simulated s = SimulateTracks(FarScenario(4.0)).value();
+  const EstimationInput input = MakeEstimationInput(s.recording);
+  size_t matches = 0;
+  for (const TimedPair& pair : input.pairs) matches += pair.matches.size();
+  PairGraphOptions options;
+  options.residual = ResidualKind::kSymmetricTransfer;
+  const UnseenFit at_truth = EvaluateUnseen(input, input.pairs, s.truth, 0.7, options);
+  EXPECT_EQ(at_truth.pairs, 120);
+  EXPECT_EQ(at_truth.matches, static_cast<int>(matches));
+  EXPECT_NEAR(at_truth.rms_px, 0.7, 0.03);
+  Calibration wrong = s.truth;
+  wrong.lens[kFocal] *= 1.1;
+  EXPECT_GT(EvaluateUnseen(input, input.pairs, wrong, 0.7, options).rms_px, 1.3 * at_truth.rms_px);
 }
 
 TEST(EstimationInput, HoldsPairsAndRatesOnOneTimeAxis) {

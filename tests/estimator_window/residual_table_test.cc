@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <vector>
 
+#include "core/robust_statistics.h"
 #include "tests/estimator_window/simulated_input.h"
 
 namespace camgyro {
@@ -15,8 +17,7 @@ struct Scene {
   PairGraphOptions options;
 };
 
-Scene MakeScene(double noise_px) {
-  simulation::Scenario scenario = ShortScenario(/*duration_s=*/2.0);
+Scene MakeScene(double noise_px, simulation::Scenario scenario = ShortScenario(2.0)) {
   scenario.tracks.noise_px = noise_px;
   scenario.gyro.noise_density_rad_s_rtHz = 0.0;
   Scene scene;
@@ -77,6 +78,35 @@ TEST(ResidualTable, CorrectionTakesAShiftBack) {
       row.time_s,
       pairs[0].time_b_s + truth.delay_s + truth.readout_s * row.match.px_b.y() / truth.height_px,
       1e-12);
+}
+
+TEST(ResidualTable, OfTransfersIsNoiseAtTheTruthAndTakesAShiftBack) {
+  Scene scene = MakeScene(/*noise_px=*/0.7, FarScenario(2.0));
+  scene.options.residual = ResidualKind::kSymmetricTransfer;
+  const auto rows =
+      ComputeResiduals(scene.input, scene.input.pairs, scene.simulated.truth, 0.7, scene.options);
+  ASSERT_GT(rows.size(), 1500u);
+  std::vector<double> magnitudes;
+  double sum_sq_px = 0.0;
+  for (const MatchResidual& row : rows) {
+    magnitudes.push_back(row.residual_px);
+    sum_sq_px += row.correction_px.squaredNorm();
+  }
+  EXPECT_NEAR(1.4826 * MedianInPlace(&magnitudes), 0.7, 0.03);
+  // Two coordinates with the noise of both images.
+  EXPECT_NEAR(std::sqrt(sum_sq_px / static_cast<double>(rows.size())), 2.0 * 0.7, 0.05);
+
+  scene = MakeScene(/*noise_px=*/0.0, FarScenario(2.0));
+  scene.options.residual = ResidualKind::kSymmetricTransfer;
+  scene.options.match_noise = MatchNoise::kSecondImage;
+  std::vector<TimedPair> pairs = {scene.input.pairs[10]};
+  const Eigen::Vector2d shift(0.3, -0.4);
+  pairs[0].matches[7].px_b += shift;
+  const auto shifted =
+      ComputeResiduals(scene.input, pairs, scene.simulated.truth, 0.05, scene.options);
+  ASSERT_EQ(shifted.size(), pairs[0].matches.size());
+  EXPECT_LT((shifted[7].correction_px + shift).norm(), 0.05);
+  for (size_t i = 0; i < shifted.size(); ++i) EXPECT_EQ(shifted[i].inlier, i != 7) << i;
 }
 
 TEST(ResidualTable, LeavesOutWhatTheGyroDoesNotCover) {

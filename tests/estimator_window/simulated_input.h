@@ -25,6 +25,13 @@ inline simulation::Scenario ShortScenario(double duration_s) {
   return scenario;
 }
 
+// The same past points so far away that 1.2 m/s shows 0.01 px from frame to frame.
+inline simulation::Scenario FarScenario(double duration_s) {
+  simulation::Scenario scenario = ShortScenario(duration_s);
+  scenario.scene.depth_m = {2000.0, 20000.0};
+  return scenario;
+}
+
 // The truth with the focal length 5 % and the delay 5 ms off, q_gyro_cam by 20 mrad per axis and
 // no bias; the prior is as wide as that of a phone's declaration.
 inline Calibration StartOffTheTruth(const Calibration& truth) {

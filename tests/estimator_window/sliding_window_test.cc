@@ -62,6 +62,20 @@ TEST(SlidingWindow, FindsTheTruthWithinItsSigmasAndAgreesWithTheRefinement) {
   EXPECT_LT(gap.cwiseAbs().maxCoeff(), 3.0) << gap.transpose();
 }
 
+TEST(SlidingWindow, FindsTheTruthOfAFarSceneByTransfers) {
+  const Simulated s = SimulateTracks(FarScenario(8.0)).value();
+  SlidingWindowOptions options;
+  options.graph.residual = ResidualKind::kSymmetricTransfer;
+  SlidingWindow window = MakeWindow(s, options);
+  FeedAll(s.recording, &window);
+  EXPECT_EQ(window.num_skipped_pairs(), 0);
+  EXPECT_EQ(window.num_failed_solves(), 0);
+  EXPECT_TRUE(window.latest().settled);
+  EXPECT_NEAR(window.latest().noise_px, 0.7, 0.04);
+  const StateVector error = ErrorInSigmas(window.latest().estimate, s.truth);
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 4.5) << error.transpose();
+}
+
 TEST(SlidingWindow, TwoRunsAreBitIdenticalAndMemoryIsBounded) {
   const Simulated s = SimulateTracks(ShortScenario(7.0)).value();
   // Settles early, so that the test is quick.

@@ -115,6 +115,39 @@ TEST(SymmetricTransfer, IsWhitened) {
   EXPECT_NEAR(sum / kDraws / static_cast<double>(exact.size()), 2.0, 0.15);
 }
 
+// The same noise: each of the two has unit variance and knows nothing of the other. They are as
+// long as the four, whatever the loss.
+TEST(SymmetricTransfer, TwoResidualsOfAMatchAreIndependent) {
+  PairScene s = RotationScene(1);
+  const std::vector<Match> exact = s.pair->matches;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal(0.0, s.pair->sigma_px);
+  const int kDraws = 400;
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+  for (int i = 0; i < kDraws; ++i) {
+    for (size_t k = 0; k < exact.size(); ++k) {
+      s.pair->matches[k].px_a = exact[k].px_a + Vector2d(normal(random), normal(random));
+      s.pair->matches[k].px_b = exact[k].px_b + Vector2d(normal(random), normal(random));
+    }
+    s.pair->robust_threshold = 0.0;
+    const VectorXd four = Residuals(&s);
+    s.pair->robust_threshold = 1.0;
+    const std::vector<double> two =
+        SymmetricTransfer(s.pair).IndependentResiduals(s.Parameters(/*with_tau=*/false).data());
+    ASSERT_EQ(two.size(), 2 * exact.size());
+    for (size_t k = 0; k < exact.size(); ++k) {
+      const Vector2d r(two[2 * k], two[2 * k + 1]);
+      EXPECT_NEAR(r.norm(), four.segment<4>(4 * static_cast<Eigen::Index>(k)).norm(), 1e-12);
+      sum += r * r.transpose();
+    }
+  }
+  // Known to sqrt(2 / n), 0.02, and 0.015 off the diagonal; and the local scale, as above.
+  sum /= kDraws * static_cast<double>(exact.size());
+  EXPECT_NEAR(sum(0, 0), 1.0, 0.08);
+  EXPECT_NEAR(sum(1, 1), 1.0, 0.08);
+  EXPECT_NEAR(sum(0, 1), 0.0, 0.06);
+}
+
 // The loss bends the length of the four residuals and keeps their direction.
 TEST(SymmetricTransfer, LossTakesTheWholeMatch) {
   PairScene s = MakePairScene(2);
@@ -152,6 +185,7 @@ TEST(SymmetricTransfer, RejectsWhatLeavesTheLens) {
   const SymmetricTransfer factor(s.pair);
   VectorXd r(factor.num_residuals());
   EXPECT_FALSE(factor.Evaluate(s.Parameters(/*with_tau=*/false).data(), r.data(), nullptr));
+  EXPECT_TRUE(factor.IndependentResiduals(s.Parameters(/*with_tau=*/false).data()).empty());
 }
 
 }  // namespace

@@ -31,7 +31,10 @@ TEST_F(CommandLineTest, BadUsageIsTwoAndSaysWhat) {
        "unknown flag --residul of `camgyro calibrate`; did you mean "
        "--residual?"},
       {"calibrate a --logtostderr", "unknown flag --logtostderr"},
-      {"calibrate a --residual=point", "--residual=point: expected plane or determinant"},
+      {"calibrate a --residual=point", "--residual=point: expected plane, determinant or transfer"},
+      {"calibrate a --residual=transfer --effects=radial_distortion",
+       "--effects=radial_distortion: expected none with --residual=transfer"},
+      {"calibrate a --robust=perhaps", "--robust: expected true or false, got `perhaps`"},
       {"calibrate a --estimator=magic", "--estimator=magic: expected window or ekf"},
       {"calibrate a --search_s=long", "--search_s: expected a number, got `long`"},
       {"calibrate a --search_s=-1", "--search_s: expected a positive number"},
@@ -54,8 +57,9 @@ TEST_F(CommandLineTest, BadUsageIsTwoAndSaysWhat) {
 
 TEST_F(CommandLineTest, FlagsHaveTheUsualForms) {
   // All of these get as far as the recording, which is not there.
-  for (const char* flags : {"--out x --quiet", "--out=x --norefine", "-search-s 3",
-                            "--refine=false", "--delay_ms=-3.5", "--delay_ms -3.5"}) {
+  for (const char* flags :
+       {"--out x --quiet", "--out=x --norefine", "-search-s 3", "--refine=false",
+        "--residual=transfer --robust=false", "--norobust", "--delay_ms=-3.5", "--delay_ms -3.5"}) {
     SCOPED_TRACE(flags);
     const RunResult result = Run("calibrate no_such_folder " + std::string(flags));
     EXPECT_EQ(result.exit_code, 3);

@@ -83,6 +83,24 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
   EXPECT_LT(again.out.size(), run.out.size());
 }
 
+TEST_F(CommandsTest, CalibrateByTransfersWhereTheSceneIsFar) {
+  Simulate(std::string(kHandheld) + "scene: {depth_m: [2000, 20000]}\n", "a");
+  const RunResult run = Run("calibrate a --residual=transfer --out=result");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
+  const auto expect_near = [](const YAML::Node& node, double truth, double most_sigma) {
+    const double sigma = node["sigma"].as<double>();
+    EXPECT_LT(sigma, most_sigma);
+    EXPECT_NEAR(node["value"].as<double>(), truth, 5.0 * sigma);
+  };
+  expect_near(result["camera"]["focal_px"], 290.0, 3.0);
+  expect_near(result["shutter"]["readout_s"], 0.020, 0.001);
+  expect_near(result["clock"]["delay_s"], 0.015, 0.001);
+  EXPECT_NEAR(result["quality"]["noise_px"].as<double>(), 0.2, 0.02);
+  EXPECT_NEAR(result["quality"]["unseen_rms_px"].as<double>(),
+              result["quality"]["rms_px"].as<double>(), 0.02);
+}
+
 TEST_F(CommandsTest, DelayFindsTheMiddleRowsDelay) {
   Simulate(kHandheld, "a");
   const RunResult run = Run("delay a --out=result");

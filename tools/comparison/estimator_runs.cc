@@ -36,8 +36,7 @@ void Measure(const std::function<void()>& work, EstimatorRun* run) {
   run->memory_mb = std::max(0.0, StatusKb("VmHWM") - held_kb) / 1024.0;
 }
 
-PairGraphOptions GraphOptions(const Input& input) {
-  PairGraphOptions options;
+PairGraphOptions WithNoiseOf(const Input& input, PairGraphOptions options) {
   options.match_noise = input.recording.match_noise;
   options.gyro_sigma_rad_s = GyroSigma(input.recording, input.start.delay_s);
   if (input.recording.gyro_info.random_walk_rad_s2_rtHz) {
@@ -48,10 +47,11 @@ PairGraphOptions GraphOptions(const Input& input) {
 }
 
 // Pairs and samples in the order of real time, as CalibrateRecording feeds them.
-std::vector<WindowUpdate> RunWindow(const Input& input, const EstimationInput& data) {
+std::vector<WindowUpdate> RunWindow(const Input& input, const EstimationInput& data,
+                                    const PairGraphOptions& graph) {
   std::vector<WindowUpdate> trace;
   SlidingWindowOptions options;
-  options.graph = GraphOptions(input);
+  options.graph = graph;
   SlidingWindow window(input.start, input.prior, data.origin_ns, options);
   window.SetListener([&](const WindowUpdate& update) { trace.push_back(update); });
   size_t next = 0;
@@ -103,10 +103,10 @@ void TakeTrace(const std::vector<WindowUpdate>& trace, const Input& input, Estim
   }
 }
 
-void RunRefinement(const Input& input, const EstimationInput& data,
+void RunRefinement(const Input& input, const EstimationInput& data, const PairGraphOptions& graph,
                    const std::vector<WindowUpdate>& window_trace, EstimatorRun* run) {
   RefinementOptions options;
-  options.graph = GraphOptions(input);
+  options.graph = graph;
   Calibration from = input.start;
   if (!window_trace.empty()) {
     from = window_trace.back().estimate;
@@ -130,7 +130,8 @@ const std::vector<std::string>& EstimatorNames() {
 }
 
 std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, const Input& input,
-                                        const EkfOptions& ekf) {
+                                        const PairGraphOptions& graph, const EkfOptions& ekf) {
+  const PairGraphOptions fit = WithNoiseOf(input, graph);
   const EstimationInput data = MakeEstimationInput(input.recording, SelectPairs(input.recording));
   std::vector<EstimatorRun> runs;
   // The window's, also for the refinement, which begins where it ends.
@@ -139,7 +140,7 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
   const auto run_window = [&] {
     if (window) return;
     window.emplace();
-    Measure([&] { window_trace = RunWindow(input, data); }, &*window);
+    Measure([&] { window_trace = RunWindow(input, data, fit); }, &*window);
     TakeTrace(window_trace, input, &*window);
   };
   for (const std::string& name : names) {
@@ -156,7 +157,7 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
       run = *window;
     } else {
       run_window();
-      RunRefinement(input, data, window_trace, &run);
+      RunRefinement(input, data, fit, window_trace, &run);
     }
     run.estimator = name;
     run.frames = static_cast<int>(input.recording.frames.size());

@@ -7,6 +7,7 @@
 
 #include "core/calibration.h"
 #include "estimator/reference/implicit_ekf.h"
+#include "estimator/window/pair_graph.h"
 #include "tools/comparison/comparison_input.h"
 
 namespace camgyro::comparison {
@@ -32,9 +33,10 @@ struct EstimatorRun {
   double memory_mb = 0.0;  // peak above what the process held before; 0 where /proc cannot tell
 };
 
-// names: of EstimatorNames(). The filter is told `ekf` as it is.
+// names: of EstimatorNames(). Window and refinement take `graph`, with the noise of the input; the
+// filter is told `ekf` as it is.
 std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, const Input& input,
-                                        const EkfOptions& ekf);
+                                        const PairGraphOptions& graph, const EkfOptions& ekf);
 
 // A run of one seed: every estimator and the bound (scenarios only; one entry per pair of frames).
 struct SeedRun {

@@ -40,6 +40,7 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
     const std::vector<TimedPair> pairs = Spread(input.pairs);
     PairGraphOptions options;
     options.match_noise = recording.match_noise;
+    options.residual = report.residual;
     const double noise_px = report.quality.noise_px;
     const std::vector<TitledResiduals> fits = {
         {"at the start",

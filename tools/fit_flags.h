@@ -1,0 +1,20 @@
+// Flags of the commands that fit matches: what a match is held against, and the loss.
+#ifndef CAMGYRO_TOOLS_FIT_FLAGS_H_
+#define CAMGYRO_TOOLS_FIT_FLAGS_H_
+
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "estimator/window/pair_graph.h"
+
+namespace camgyro {
+
+// Names of the flags that ReadFitFlags obeys.
+std::vector<std::string> FitFlags();
+
+Status ReadFitFlags(PairGraphOptions* options);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_TOOLS_FIT_FLAGS_H_
