@@ -87,7 +87,7 @@ void Bearing::ScaleNoise(const Eigen::Vector3d& factor) {
 
 void Backpropagate(const Bearing& b, const RotationChain& chain, double height_px,
                    const Eigen::Vector3d& by_ray, const Eigen::Matrix<double, 3, 2>& by_J_ray_px,
-                   PairGradient* gradient, Eigen::Ref<Eigen::Matrix3Xd> by_rates) {
+                   PairGradient* gradient, RotationChain::RateGradient by_rates) {
   const Eigen::Vector3d& ray = b.lens_ray.ray;
   const Eigen::Vector3d& omega = b.omega_cam_rad_s;
   // In the camera frame at the time of exposure.

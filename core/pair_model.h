@@ -87,7 +87,7 @@ struct PairGradient {
 // derivatives by ray_ref and by J_ray_px of one bearing.
 void Backpropagate(const Bearing& bearing, const RotationChain& chain, double height_px,
                    const Eigen::Vector3d& by_ray, const Eigen::Matrix<double, 3, 2>& by_J_ray_px,
-                   PairGradient* gradient, Eigen::Ref<Eigen::Matrix3Xd> by_rates);
+                   PairGradient* gradient, RotationChain::RateGradient by_rates);
 
 }  // namespace camgyro
 

@@ -11,14 +11,18 @@ RotationChain::RotationChain(const std::vector<double>& times_s,
     : times_s_(times_s), omega_(omega_gyro_rad_s) {
   const size_t n = times_s_.size();
   prefix_.resize(n);
-  segment_.resize(n);
+  before_.setZero(3 * static_cast<Eigen::Index>(n), 3);
+  around_.setZero(3 * static_cast<Eigen::Index>(n), 3);
   prefix_[0].setIdentity();
   for (size_t j = 0; j + 1 < n; ++j) {
     const double dt = times_s_[j + 1] - times_s_[j];
     const auto col = static_cast<Eigen::Index>(j);
     const Eigen::Vector3d theta = 0.5 * dt * (omega_.col(col) + omega_.col(col + 1));
-    segment_[j] = (0.5 * dt) * prefix_[j] * LeftJacobian(theta);
-    prefix_[j + 1] = prefix_[j] * Exp(theta).toRotationMatrix();
+    const Eigen::Matrix3d J_phi_theta = prefix_[j] * LeftJacobian(theta);
+    prefix_[j + 1] = prefix_[j] + J_phi_theta * Hat(theta);  // Exp(theta) = I + J_l(theta) theta^
+    const Eigen::Matrix3d segment = 0.5 * dt * J_phi_theta.transpose();
+    before_.middleRows<3>(3 * col + 3) = segment;
+    around_.middleRows<3>(3 * col) = before_.middleRows<3>(3 * col) + segment;
   }
 }
 
@@ -52,21 +56,18 @@ RotationChain::State RotationChain::At(double time_s) const {
   }
   const Eigen::Matrix3d& start = prefix_[static_cast<size_t>(j)];
   state.J_phi_theta = start * LeftJacobian(theta);
-  state.R_ref_gyro = start * Exp(theta).toRotationMatrix();
+  state.R_ref_gyro = start + state.J_phi_theta * Hat(theta);
   return state;
 }
 
 void RotationChain::AddRateGradient(const State& state, const Eigen::Vector3d& by_phi,
-                                    const Eigen::Vector3d& by_omega,
-                                    Eigen::Ref<Eigen::Matrix3Xd> gradient) const {
+                                    const Eigen::Vector3d& by_omega, RateGradient gradient) const {
   const int m = state.segment;
   // Whole segments before the one of `state`; past the last sample, the last one is whole too.
   const int whole = (state.weight_next == 1.0 && state.theta_this_s == 0.0) ? m + 1 : m;
-  for (int j = 0; j < whole; ++j) {
-    const Eigen::Vector3d part = segment_[static_cast<size_t>(j)].transpose() * by_phi;
-    gradient.col(j) += part;
-    gradient.col(j + 1) += part;
-  }
+  Eigen::Map<Eigen::VectorXd>(gradient.data(), 3 * whole) +=
+      around_.topRows(3 * whole).lazyProduct(by_phi);
+  gradient.col(whole) += before_.middleRows<3>(3 * whole) * by_phi;
   const Eigen::Vector3d by_theta = state.J_phi_theta.transpose() * by_phi;
   gradient.col(m) += state.theta_this_s * by_theta + (1.0 - state.weight_next) * by_omega;
   gradient.col(m + 1) += state.theta_next_s * by_theta + state.weight_next * by_omega;

@@ -54,18 +54,20 @@ class RotationChain {
 
   State At(double time_s) const;
 
+  using RateGradient = Eigen::Ref<Eigen::Matrix3Xd, 0, Eigen::OuterStride<3>>;  // without gaps
   // Adds to `gradient` (3 x size) the derivative of a scalar by every rate, given its derivatives
   // by the left perturbation phi of R_ref_gyro and by the rate at that time. Columns after
   // state.segment + 1 stay untouched.
   void AddRateGradient(const State& state, const Eigen::Vector3d& by_phi,
-                       const Eigen::Vector3d& by_omega,
-                       Eigen::Ref<Eigen::Matrix3Xd> gradient) const;
+                       const Eigen::Vector3d& by_omega, RateGradient gradient) const;
 
  private:
   std::vector<double> times_s_;
   Eigen::Matrix3Xd omega_;
-  std::vector<Eigen::Matrix3d> prefix_;   // R_ref_gyro at each sample
-  std::vector<Eigen::Matrix3d> segment_;  // prefix * J_l(theta) * dt / 2 of each whole segment
+  std::vector<Eigen::Matrix3d> prefix_;  // R_ref_gyro at each sample
+  // Three rows for each sample: transposed derivative of the left perturbation of R_ref_gyro by its
+  // rate, through the segment before it, and through that and the one after it.
+  Eigen::Matrix<double, Eigen::Dynamic, 3> before_, around_;
 };
 
 }  // namespace camgyro

@@ -60,10 +60,10 @@ Eigen::Matrix<T, 3, 1> Log(const Eigen::Quaternion<T>& q) {
 inline Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& phi) {
   const double angle_sq = phi.squaredNorm();
   const Eigen::Matrix3d hat = Hat(phi);
-  double a, b;  // (1 - cos)/angle^2, (angle - sin)/angle^3
-  if (angle_sq < 1e-6) {
-    a = 0.5 - angle_sq / 24.0 + angle_sq * angle_sq / 720.0;
-    b = 1.0 / 6.0 - angle_sq / 120.0 + angle_sq * angle_sq / 5040.0;
+  double a, b;            // (1 - cos)/angle^2, (angle - sin)/angle^3
+  if (angle_sq < 1e-2) {  // to 1e-14; a gyro sample's turn
+    a = 0.5 - angle_sq * (1.0 / 24.0 - angle_sq * (1.0 / 720.0 - angle_sq / 40320.0));
+    b = 1.0 / 6.0 - angle_sq * (1.0 / 120.0 - angle_sq * (1.0 / 5040.0 - angle_sq / 362880.0));
   } else {
     const double angle = std::sqrt(angle_sq);
     a = (1.0 - std::cos(angle)) / angle_sq;

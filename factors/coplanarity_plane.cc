@@ -52,18 +52,14 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
   const int first_rate_group = kEffectsBlock + NumEffectBlocks(pair);
   const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + first_rate_group);
   const RotationChain chain(pair.rate_times_s, rates);
-  PairBearings bearings;
-  if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],
-                            pair.effects ? parameters[kEffectsBlock] : nullptr,
-                            jacobians != nullptr, &bearings)) {
-    return false;
-  }
+  const BearingsOfMatch bearings(pair, chain, parameters[0], parameters[1], parameters[2],
+                                 pair.effects ? parameters[kEffectsBlock] : nullptr);
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
   const Eigen::Vector3d turn = Eigen::Map<const Eigen::Vector3d>(parameters[kTurnBlock]);
   PairRow row(chain.size());
+  Bearing a, b;
   for (size_t i = 0; i < pair.matches.size(); ++i) {
-    const Bearing& a = bearings.a[i];
-    const Bearing& b = bearings.b[i];
+    if (!bearings.Evaluate(i, jacobians != nullptr, &a, &b)) return false;
     const double share = RowShare(pair, pair.matches[i]);
     const PlaneResidual r =
         EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau + share * turn,

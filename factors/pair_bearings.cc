@@ -6,27 +6,37 @@
 
 namespace camgyro {
 
+BearingsOfMatch::BearingsOfMatch(const PairMeasurement& pair, const RotationChain& chain,
+                                 const double* lens, const double* shutter,
+                                 const double* q_gyro_cam, const double* effects)
+    : pair_(pair),
+      chain_(chain),
+      lens_(Eigen::Map<const LensParameters>(lens)),
+      shutter_(Eigen::Map<const ShutterParameters>(shutter)),
+      R_gyro_cam_(Eigen::Map<const Eigen::Quaterniond>(q_gyro_cam).normalized().toRotationMatrix()),
+      effects_{pair.effects.get(), effects} {}
+
+bool BearingsOfMatch::Evaluate(size_t match, bool derivatives, Bearing* a, Bearing* b) const {
+  const Match& m = pair_.matches[match];
+  if (!EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, pair_.frame_a,
+                       pair_.size_px, m.px_a, effects_, a, derivatives) ||
+      !EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, pair_.frame_b,
+                       pair_.size_px, m.px_b, effects_, b, derivatives)) {
+    return false;
+  }
+  b->ScaleNoise(m.noise_factor_b);
+  return true;
+}
+
 bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
                           const double* lens, const double* shutter, const double* q_gyro_cam,
                           const double* effects, bool derivatives, PairBearings* bearings) {
-  const LensParameters lens_parameters = Eigen::Map<const LensParameters>(lens);
-  const ShutterParameters shutter_parameters = Eigen::Map<const ShutterParameters>(shutter);
-  const Eigen::Matrix3d R_gyro_cam =
-      Eigen::Map<const Eigen::Quaterniond>(q_gyro_cam).normalized().toRotationMatrix();
-  const PairEffects pair_effects{pair.effects.get(), effects};
+  const BearingsOfMatch of_match(pair, chain, lens, shutter, q_gyro_cam, effects);
   const size_t n = pair.matches.size();
   bearings->a.resize(n);
   bearings->b.resize(n);
   for (size_t i = 0; i < n; ++i) {
-    if (!EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
-                         pair.frame_a, pair.size_px, pair.matches[i].px_a, pair_effects,
-                         &bearings->a[i], derivatives) ||
-        !EvaluateBearing(*pair.lens, lens_parameters, shutter_parameters, R_gyro_cam, chain,
-                         pair.frame_b, pair.size_px, pair.matches[i].px_b, pair_effects,
-                         &bearings->b[i], derivatives)) {
-      return false;
-    }
-    bearings->b[i].ScaleNoise(pair.matches[i].noise_factor_b);
+    if (!of_match.Evaluate(i, derivatives, &bearings->a[i], &bearings->b[i])) return false;
   }
   return true;
 }

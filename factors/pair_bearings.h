@@ -50,6 +50,24 @@ struct PairBearings {
   std::vector<Bearing> a, b;
 };
 
+// The bearings of a pair's matches, one match at a time: those of a whole pair are a quarter of a
+// megabyte, which takes longer to allocate than to fill. Refers to its arguments.
+class BearingsOfMatch {
+ public:
+  BearingsOfMatch(const PairMeasurement& pair, const RotationChain& chain, const double* lens,
+                  const double* shutter, const double* q_gyro_cam, const double* effects);
+  // False where the lens has no ray. PairRow needs `derivatives`.
+  [[nodiscard]] bool Evaluate(size_t match, bool derivatives, Bearing* a, Bearing* b) const;
+
+ private:
+  const PairMeasurement& pair_;
+  const RotationChain& chain_;
+  const LensParameters lens_;
+  const ShutterParameters shutter_;
+  const Eigen::Matrix3d R_gyro_cam_;
+  const PairEffects effects_;
+};
+
 // Evaluates both bearings of every match; false where the lens has no ray. PairRow needs
 // `derivatives`.
 [[nodiscard]] bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,

@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "factors/coplanarity_plane.h"
 #include "factors/robust.h"
@@ -23,19 +25,59 @@ std::vector<Vector3d> HalfSphere(int count) {
   return directions;
 }
 
-double Cost(const PairBearings& bearings, double variance_a, double variance_b, double threshold,
-            const Vector3d& tau, size_t stride) {
-  double cost = 0.0;
+// The plane residual of a match, prepared for many directions: numerator and sigma are linear in
+// the direction and the norm of a linear form.
+struct PreparedMatch {
+  PreparedMatch(const Bearing& at_a, const Bearing& at_b, double variance_a, double variance_b)
+      : ray_b(at_b.ray_ref) {
+    const Vector3d& a = at_a.ray_ref;
+    form.row(0) = a.cross(ray_b);
+    for (int k = 0; k < 2; ++k) {
+      form.row(1 + k) = std::sqrt(variance_a) * at_a.J_ray_px.col(k).cross(ray_b);
+      form.row(3 + k) = std::sqrt(variance_b) * a.cross(at_b.J_ray_px.col(k));
+    }
+  }
+
+  Eigen::Matrix<double, 5, 3> form;  // x . (a x b), and its derivatives by the pixels in sigmas
+  Vector3d ray_b;
+};
+
+std::vector<PreparedMatch> Prepare(const PairBearings& bearings, double variance_a,
+                                   double variance_b, size_t stride) {
+  std::vector<PreparedMatch> matches;
   for (size_t i = 0; i < bearings.a.size(); i += stride) {
-    const Vector3d &a = bearings.a[i].ray_ref, &b = bearings.b[i].ray_ref;
-    const double e = tau.dot(a.cross(b));
-    const double variance =
-        variance_a * (bearings.a[i].J_ray_px.transpose() * b.cross(tau)).squaredNorm() +
-        variance_b * (bearings.b[i].J_ray_px.transpose() * tau.cross(a)).squaredNorm() + 1e-30;
-    const double r = Robustify(e / std::sqrt(variance), threshold).value;
-    cost += r * r;
+    matches.emplace_back(bearings.a[i], bearings.b[i], variance_a, variance_b);
+  }
+  return matches;
+}
+
+// The sum, or something beyond `bound` if the sum is.
+double Cost(const std::vector<PreparedMatch>& matches, double threshold, const Vector3d& tau,
+            double bound = std::numeric_limits<double>::infinity()) {
+  const double k_sq =
+      threshold > 0.0 ? threshold * threshold : std::numeric_limits<double>::infinity();
+  double cost = 0.0;
+  for (const PreparedMatch& match : matches) {
+    const Eigen::Matrix<double, 5, 1> e = match.form * tau;
+    const double e_sq = e[0] * e[0], variance = e.tail<4>().squaredNorm() + 1e-30;
+    // The square of Robustify(e / sigma).
+    cost += e_sq <= k_sq * variance ? e_sq / variance : k_sq * (2.0 - k_sq * variance / e_sq);
+    if (cost > bound) break;
   }
   return cost;
+}
+
+double CostOfPointsBehind(const std::vector<PreparedMatch>& matches, double robust_threshold,
+                          const Vector3d& tau) {
+  // With a and b turned to one orientation, the depth along a has the sign of (tau x b).(a x b).
+  int in_front = 0, behind = 0;
+  for (const PreparedMatch& match : matches) {
+    const Eigen::Matrix<double, 5, 1> parallax = match.form * tau.cross(match.ray_b);
+    if (parallax[0] * parallax[0] < 4.0 * parallax.tail<4>().squaredNorm()) continue;
+    ++(parallax[0] > 0.0 ? in_front : behind);
+  }
+  const double outlier = robust_threshold > 0.0 ? robust_threshold * robust_threshold : 9.0;
+  return outlier * std::min(in_front, behind);
 }
 
 struct Refined {
@@ -43,9 +85,10 @@ struct Refined {
   double cost;
 };
 
-Refined Refine(const PairBearings& bearings, double variance_a, double variance_b, double threshold,
-               Vector3d tau) {
-  double cost = Cost(bearings, variance_a, variance_b, threshold, tau, 1);
+// matches: those of the bearings.
+Refined Refine(const PairBearings& bearings, const std::vector<PreparedMatch>& matches,
+               double variance_a, double variance_b, double threshold, Vector3d tau) {
+  double cost = Cost(matches, threshold, tau);
   double damping = 1e-3;
   for (int iteration = 0; iteration < 8; ++iteration) {
     const Vector3d u = tau.unitOrthogonal(), v = tau.cross(u);
@@ -66,7 +109,7 @@ Refined Refine(const PairBearings& bearings, double variance_a, double variance_
     H.diagonal().array() += 1e-12;
     const Eigen::Vector2d step = -H.ldlt().solve(g);
     const Vector3d candidate = (tau + basis * step).normalized();
-    const double candidate_cost = Cost(bearings, variance_a, variance_b, threshold, candidate, 1);
+    const double candidate_cost = Cost(matches, threshold, candidate);
     if (candidate_cost < cost) {
       const bool converged = cost - candidate_cost < 1e-5 * cost;
       tau = candidate;
@@ -84,21 +127,8 @@ Refined Refine(const PairBearings& bearings, double variance_a, double variance_
 }  // namespace
 
 double CostOfPointsBehind(const PairBearings& bearings, double variance_a, double variance_b,
-                          double robust_threshold, const Vector3d& tau, size_t stride) {
-  // With a and b turned to one orientation, the depth along a has the sign of (tau x b).(a x b).
-  int in_front = 0, behind = 0;
-  for (size_t i = 0; i < bearings.a.size(); i += stride) {
-    const Vector3d &a = bearings.a[i].ray_ref, &b = bearings.b[i].ray_ref;
-    const Vector3d along = tau.cross(b);
-    const double parallax = along.dot(a.cross(b));
-    const double variance =
-        variance_a * (bearings.a[i].J_ray_px.transpose() * b.cross(along)).squaredNorm() +
-        variance_b * (bearings.b[i].J_ray_px.transpose() * along.cross(a)).squaredNorm();
-    if (parallax * parallax < 4.0 * variance) continue;
-    ++(parallax > 0.0 ? in_front : behind);
-  }
-  const double outlier = robust_threshold > 0.0 ? robust_threshold * robust_threshold : 9.0;
-  return outlier * std::min(in_front, behind);
+                          double robust_threshold, const Vector3d& tau) {
+  return CostOfPointsBehind(Prepare(bearings, variance_a, variance_b, 1), robust_threshold, tau);
 }
 
 DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
@@ -116,23 +146,24 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
   }
   // Some 60 matches rank the candidates well enough; the refinement uses them all.
   const size_t stride = std::max<size_t>(1, n / 60);
-  const auto total_cost = [&](double cost, const Vector3d& tau, size_t step) {
-    return cost + CostOfPointsBehind(bearings, variance_a, variance_b, robust_threshold, tau, step);
-  };
-  std::vector<std::pair<double, size_t>> ranked;
+  const std::vector<PreparedMatch> all = Prepare(bearings, variance_a, variance_b, 1),
+                                   some = Prepare(bearings, variance_a, variance_b, stride);
+  std::vector<std::pair<double, size_t>> ranked;  // the best three
   for (size_t c = 0; c < candidates.size(); ++c) {
-    const double cost =
-        Cost(bearings, variance_a, variance_b, robust_threshold, candidates[c], stride);
-    ranked.emplace_back(total_cost(cost, candidates[c], stride), c);
+    const double bound =
+        ranked.size() < 3 ? std::numeric_limits<double>::infinity() : ranked.back().first;
+    double cost = Cost(some, robust_threshold, candidates[c], bound);
+    if (cost >= bound) continue;
+    cost += CostOfPointsBehind(some, robust_threshold, candidates[c]);
+    ranked.insert(std::upper_bound(ranked.begin(), ranked.end(), std::make_pair(cost, c)),
+                  {cost, c});
+    if (ranked.size() > 3) ranked.pop_back();
   }
-  const size_t starts = std::min<size_t>(3, ranked.size());
-  std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(starts),
-                    ranked.end());
   DirectionEstimate best;
-  for (size_t s = 0; s < starts; ++s) {
-    const Refined refined =
-        Refine(bearings, variance_a, variance_b, robust_threshold, candidates[ranked[s].second]);
-    const double cost = total_cost(refined.cost, refined.tau, 1);
+  for (size_t s = 0; s < ranked.size(); ++s) {
+    const Refined refined = Refine(bearings, all, variance_a, variance_b, robust_threshold,
+                                   candidates[ranked[s].second]);
+    const double cost = refined.cost + CostOfPointsBehind(all, robust_threshold, refined.tau);
     if (s == 0 || cost < best.cost) {
       best.tau = refined.tau;
       best.cost = cost;

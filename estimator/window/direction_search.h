@@ -27,7 +27,7 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
 // would lie behind the camera count as outliers, for the sign of tau that leaves fewer of them.
 // Counted where the parallax is beyond 2 sigma.
 double CostOfPointsBehind(const PairBearings& bearings, double variance_a, double variance_b,
-                          double robust_threshold, const Eigen::Vector3d& tau, size_t stride = 1);
+                          double robust_threshold, const Eigen::Vector3d& tau);
 
 }  // namespace camgyro
 

@@ -1,14 +1,14 @@
 #include "estimator/window/factor_graph.h"
 
-#include <ceres/ceres.h>
 #include <ceres/sphere_manifold.h>
 #include <glog/logging.h>
 
-#include <Eigen/CholmodSupport>
-#include <Eigen/Sparse>
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <set>
 
+#include "estimator/window/block_cholesky.h"
 #include "estimator/window/marginalize.h"
 #include "factors/marginal_prior.h"
 #include "factors/rotation_manifold.h"
@@ -16,97 +16,158 @@
 namespace camgyro {
 namespace {
 
-// A ceres::Problem on values that live elsewhere; owns the manifolds.
-class ProblemView {
- public:
-  ProblemView(const std::map<BlockId, Block>& blocks, const std::vector<const Factor*>& factors,
-              const std::function<double*(const BlockId&)>& data)
-      : problem_(Options()) {
-    std::set<BlockId> used;
-    for (const Factor* factor : factors) used.insert(factor->blocks.begin(), factor->blocks.end());
-    for (const BlockId& id : used) {
-      const Block& block = blocks.at(id);
-      double* values = data(id);
-      problem_.AddParameterBlock(values, static_cast<int>(block.value.size()), ManifoldOf(block));
-      if (block.tangent_size() == 0) problem_.SetParameterBlockConstant(values);
-    }
-    std::vector<double*> pointers;
-    for (const Factor* factor : factors) {
-      pointers.clear();
-      for (const BlockId& id : factor->blocks) pointers.push_back(data(id));
-      // Ceres takes the cost function without const, and never changes it.
-      problem_.AddResidualBlock(const_cast<ceres::CostFunction*>(factor->cost.get()), nullptr,
-                                pointers);
-    }
+const ceres::Manifold* ManifoldOf(const Block& block) {
+  static const RotationManifold rotation;
+  static const ceres::SphereManifold<3> direction;
+  switch (block.geometry) {
+    case Geometry::kRotation:
+      return &rotation;
+    case Geometry::kDirection:
+      return &direction;
+    case Geometry::kEuclidean:
+      break;
   }
-
-  ceres::Problem* operator->() { return &problem_; }
-  ceres::Problem* get() { return &problem_; }
-
- private:
-  static ceres::Problem::Options Options() {
-    ceres::Problem::Options options;
-    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.disable_all_safety_checks = true;
-    return options;
-  }
-
-  ceres::Manifold* ManifoldOf(const Block& block) {
-    switch (block.geometry) {
-      case Geometry::kRotation:
-        return &rotation_;
-      case Geometry::kDirection:
-        return &direction_;
-      case Geometry::kEuclidean:
-        break;
-    }
-    if (block.constant.empty() || block.tangent_size() == 0) return nullptr;
-    subsets_.push_back(std::make_unique<ceres::SubsetManifold>(static_cast<int>(block.value.size()),
-                                                               block.constant));
-    return subsets_.back().get();
-  }
-
-  RotationManifold rotation_;
-  ceres::SphereManifold<3> direction_;
-  std::vector<std::unique_ptr<ceres::Manifold>> subsets_;
-  ceres::Problem problem_;  // refers to the manifolds: destroyed first
-};
-
-// The value of a block is never written through this when Ceres only evaluates.
-double* Data(const std::map<BlockId, Block>& blocks, const BlockId& id) {
-  return const_cast<double*>(blocks.at(id).value.data());
+  return nullptr;
 }
 
-struct SparseLinearization {
-  std::vector<int> offsets;
-  std::vector<double> residuals;
-  ceres::CRSMatrix J;
+bool IsConstant(const Block& block, int coordinate) {
+  return std::find(block.constant.begin(), block.constant.end(), coordinate) !=
+         block.constant.end();
+}
+
+void Move(const Eigen::VectorXd& tangent, Block* block) {
+  if (const ceres::Manifold* manifold = ManifoldOf(*block)) {
+    const Eigen::VectorXd from = block->value;
+    CHECK(manifold->Plus(from.data(), tangent.data(), block->value.data()));
+    return;
+  }
+  Eigen::Index k = 0;
+  for (int c = 0; c < block->value.size(); ++c) {
+    if (!IsConstant(*block, c)) block->value[c] += tangent[k++];
+  }
+}
+
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// A factor at the values of its blocks.
+struct LinearFactor {
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd J;  // by the tangents of its blocks, side by side
 };
 
-SparseLinearization EvaluateSparse(const std::map<BlockId, Block>& blocks,
-                                   const std::vector<const Factor*>& factors,
-                                   const std::vector<BlockId>& columns) {
-  ProblemView problem(blocks, factors, [&](const BlockId& id) { return Data(blocks, id); });
-  SparseLinearization result;
-  ceres::Problem::EvaluateOptions options;
-  options.apply_loss_function = false;  // losses are inside our factors
-  int offset = 0;
-  for (const BlockId& id : columns) {
-    result.offsets.push_back(offset);
-    if (blocks.at(id).tangent_size() > 0) options.parameter_blocks.push_back(Data(blocks, id));
-    offset += blocks.at(id).tangent_size();
+// False where the factor has no value.
+bool Evaluate(const std::map<BlockId, Block>& blocks, const Factor& factor, LinearFactor* linear) {
+  const int rows = factor.cost->num_residuals();
+  std::vector<const Block*> touched;
+  std::vector<const double*> values;
+  Eigen::Index ambient = 0, tangent = 0;
+  for (const BlockId& id : factor.blocks) {
+    touched.push_back(&blocks.at(id));
+    values.push_back(touched.back()->value.data());
+    ambient += touched.back()->value.size();
+    tangent += touched.back()->tangent_size();
   }
-  result.offsets.push_back(offset);
-  CHECK(problem->Evaluate(options, nullptr, &result.residuals, nullptr, &result.J))
-      << "a factor could not be evaluated at the present state";
-  return result;
+  Eigen::VectorXd storage(rows * ambient);
+  std::vector<double*> jacobians;
+  double* next = storage.data();
+  for (const Block* block : touched) {
+    jacobians.push_back(block->tangent_size() > 0 ? next : nullptr);
+    next += rows * block->value.size();
+  }
+  linear->residuals.resize(rows);
+  if (!factor.cost->Evaluate(values.data(), linear->residuals.data(), jacobians.data())) {
+    return false;
+  }
+  linear->J.resize(rows, tangent);
+  Eigen::Index column = 0;
+  for (size_t k = 0; k < touched.size(); ++k) {
+    const Block& block = *touched[k];
+    const int size = block.tangent_size();
+    if (size == 0) continue;
+    const Eigen::Map<const RowMajorMatrix> J(jacobians[k], rows, block.value.size());
+    if (const ceres::Manifold* manifold = ManifoldOf(block)) {
+      RowMajorMatrix plus(block.value.size(), size);
+      CHECK(manifold->PlusJacobian(block.value.data(), plus.data()));
+      linear->J.middleCols(column, size).noalias() = J.lazyProduct(plus);
+      column += size;
+    } else if (block.constant.empty()) {
+      linear->J.middleCols(column, size) = J;
+      column += size;
+    } else {
+      for (int c = 0; c < block.value.size(); ++c) {
+        if (!IsConstant(block, c)) linear->J.col(column++) = J.col(c);
+      }
+    }
+  }
+  return linear->residuals.allFinite() && linear->J.allFinite();
 }
 
 std::vector<BlockId> BlocksOf(const std::vector<const Factor*>& factors) {
   std::set<BlockId> used;
   for (const Factor* factor : factors) used.insert(factor->blocks.begin(), factor->blocks.end());
   return {used.begin(), used.end()};
+}
+
+// The unknowns of some factors in the order of elimination: turns, directions, rates from the last
+// to the first, and what all share.
+struct Unknowns {
+  Unknowns(const std::map<BlockId, Block>& blocks, const std::vector<const Factor*>& factors) {
+    ids = BlocksOf(factors);
+    std::reverse(ids.begin(), ids.end());
+    ids.erase(std::remove_if(ids.begin(), ids.end(),
+                             [&](const BlockId& id) { return blocks.at(id).tangent_size() == 0; }),
+              ids.end());
+    for (const BlockId& id : ids) {
+      numbers[id] = static_cast<int>(sizes.size());
+      sizes.push_back(blocks.at(id).tangent_size());
+      offsets.push_back(size);
+      size += sizes.back();
+    }
+    for (const Factor* factor : factors) {
+      of_factors.emplace_back();
+      for (const BlockId& id : factor->blocks) {
+        if (numbers.count(id) > 0) of_factors.back().push_back(numbers.at(id));
+      }
+    }
+  }
+
+  std::vector<BlockId> ids;
+  std::map<BlockId, int> numbers;
+  std::vector<int> sizes, offsets;
+  int size = 0;
+  std::vector<std::vector<int>> of_factors;  // numbers of the unknowns of each factor
+};
+
+// Gauss-Newton's equations information * x = -gradient at the values of the blocks.
+struct NormalEquations {
+  explicit NormalEquations(const Unknowns& unknowns)
+      : information(unknowns.sizes), gradient(Eigen::VectorXd::Zero(unknowns.size)) {}
+
+  BlockCholesky information;
+  Eigen::VectorXd gradient;
+  std::vector<Eigen::VectorXd> gradients;  // of each factor, by its own unknowns
+  double cost = 0.0;                       // half the sum of squares
+};
+
+std::optional<NormalEquations> Linearized(const std::map<BlockId, Block>& blocks,
+                                          const std::vector<const Factor*>& factors,
+                                          const Unknowns& unknowns) {
+  NormalEquations normal(unknowns);
+  LinearFactor linear;
+  for (size_t f = 0; f < factors.size(); ++f) {
+    if (!Evaluate(blocks, *factors[f], &linear)) return std::nullopt;
+    normal.cost += 0.5 * linear.residuals.squaredNorm();
+    normal.information.AddSquare(unknowns.of_factors[f], linear.J);
+    normal.gradients.push_back(linear.J.transpose() * linear.residuals);
+    Eigen::Index column = 0;
+    for (const int k : unknowns.of_factors[f]) {
+      const int size = unknowns.sizes[static_cast<size_t>(k)];
+      normal.gradient.segment(unknowns.offsets[static_cast<size_t>(k)], size) +=
+          normal.gradients.back().segment(column, size);
+      column += size;
+    }
+  }
+  return normal;
 }
 
 }  // namespace
@@ -126,97 +187,103 @@ FactorGraph::FactorKey FactorGraph::AddFactor(std::shared_ptr<const ceres::CostF
   return next_key_++;
 }
 
-SolveReport FactorGraph::Solve(const SolveOptions& options) {
+std::vector<const Factor*> FactorGraph::AllFactors() const {
   std::vector<const Factor*> factors;
   for (const auto& entry : factors_) factors.push_back(&entry.second);
-  std::map<BlockId, Eigen::VectorXd> before;
-  for (const auto& [id, block] : blocks_) before[id] = block.value;
-  ProblemView problem(blocks_, factors, [&](const BlockId& id) { return Data(blocks_, id); });
+  return factors;
+}
 
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  solver.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
-  solver.num_threads = 1;
-  solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = options.function_tolerance;
-  solver.gradient_tolerance = 1e-12;
-  solver.parameter_tolerance = 1e-10;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, problem.get(), &summary);
+SolveReport FactorGraph::Solve(const SolveOptions& options) {
+  const std::vector<const Factor*> factors = AllFactors();
+  const Unknowns unknowns(blocks_, factors);
   SolveReport report;
-  report.usable = summary.IsSolutionUsable();
-  report.iterations = static_cast<int>(summary.iterations.size());
-  report.initial_cost = summary.initial_cost;
-  report.final_cost = summary.final_cost;
-  report.message = summary.message;
-  if (!report.usable) {
-    for (auto& [id, value] : before) blocks_.at(id).value = value;
+  std::optional<NormalEquations> now = Linearized(blocks_, factors, unknowns);
+  if (!now) {
+    report.message = "a factor has no value at the start";
+    return report;
+  }
+  report.initial_cost = report.final_cost = now->cost;
+  report.message = "no step can be solved for";
+  double damping = 1e-4, growth = 2.0;
+  for (report.iterations = 0; report.iterations < options.max_iterations; ++report.iterations) {
+    const Eigen::VectorXd added = damping * now->information.Diagonal().cwiseMax(1e-6);
+    now->information.AddToDiagonal(added);
+    if (now->information.Factorize()) {
+      const Eigen::VectorXd step = now->information.Solve(-now->gradient);
+      report.usable = true;
+      report.message = "no convergence";
+      const double expected =
+          0.5 * (added.dot(step.cwiseAbs2()) - now->gradient.dot(step));  // fall of the cost
+      if (expected <= options.function_tolerance * now->cost) {
+        report.message = "convergence";
+        break;
+      }
+      std::vector<Eigen::VectorXd> before;
+      for (size_t k = 0; k < unknowns.ids.size(); ++k) {
+        Block& block = blocks_.at(unknowns.ids[k]);
+        before.push_back(block.value);
+        Move(step.segment(unknowns.offsets[k], unknowns.sizes[k]), &block);
+      }
+      if (expected <= 1e-13 * now->cost) {  // rounding hides whether the cost falls
+        report.message = "convergence to rounding";
+        break;
+      }
+      // Most steps are good: linearised at once.
+      std::optional<NormalEquations> next = Linearized(blocks_, factors, unknowns);
+      const double gain = next ? (now->cost - next->cost) / expected : 0.0;
+      if (gain > 1e-3) {
+        damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
+        growth = 2.0;
+        now = std::move(next);
+        report.final_cost = now->cost;
+        continue;
+      }
+      for (size_t k = 0; k < unknowns.ids.size(); ++k) {
+        blocks_.at(unknowns.ids[k]).value = before[k];
+      }
+    }
+    damping *= growth;
+    growth *= 2.0;
+    now = Linearized(blocks_, factors, unknowns);  // rare: cheaper than copies of the equations
   }
   return report;
 }
 
 FactorGraph::CovarianceReport FactorGraph::Covariance(
     const std::vector<Functional>& functionals) const {
-  std::vector<const Factor*> factors;
-  std::vector<FactorKey> keys;
-  for (const auto& [key, factor] : factors_) {
-    factors.push_back(&factor);
-    keys.push_back(key);
-  }
-  const std::vector<BlockId> columns = BlocksOf(factors);
-  const SparseLinearization linear = EvaluateSparse(blocks_, factors, columns);
-  const Eigen::Index n = linear.offsets.back();
-  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
-      linear.J.num_rows, linear.J.num_cols, static_cast<Eigen::Index>(linear.J.values.size()),
-      linear.J.rows.data(), linear.J.cols.data(), linear.J.values.data());
-  // J^T J factor by factor: the rows of one factor have the same columns, so that each is a small
-  // dense product (a general sparse product took a quarter of the online pass).
-  std::vector<Eigen::Triplet<double>> entries;
-  Eigen::MatrixXd dense;
-  for (Eigen::Index row = 0, f = 0; row < J.rows(); ++f) {
-    const Eigen::Index rows = factors[static_cast<size_t>(f)]->cost->num_residuals();
-    const int begin = linear.J.rows[static_cast<size_t>(row)];
-    const int count = linear.J.rows[static_cast<size_t>(row) + 1] - begin;
-    const int* const cols = linear.J.cols.data() + begin;
-    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
-        block(linear.J.values.data() + begin, rows, count);
-    dense.noalias() = block.transpose() * block;
-    for (int j = 0; j < count; ++j) {
-      for (int i = 0; i < count; ++i) {
-        if (cols[i] >= cols[j]) entries.emplace_back(cols[i], cols[j], dense(i, j));
-      }
-    }
-    row += rows;
-  }
-  Eigen::SparseMatrix<double> information(n, n);  // lower triangle
-  information.setFromTriplets(entries.begin(), entries.end());
+  const std::vector<const Factor*> factors = AllFactors();
+  const Unknowns unknowns(blocks_, factors);
+  std::optional<NormalEquations> normal = Linearized(blocks_, factors, unknowns);
+  CHECK(normal) << "a factor could not be evaluated at the present state";
 
-  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(functionals.size()));
+  Eigen::MatrixXd weights =
+      Eigen::MatrixXd::Zero(unknowns.size, static_cast<Eigen::Index>(functionals.size()));
   for (size_t i = 0; i < functionals.size(); ++i) {
     for (const FunctionalTerm& term : functionals[i]) {
-      const auto it = std::lower_bound(columns.begin(), columns.end(), term.block);
-      CHECK(it != columns.end() && *it == term.block);
-      weights(linear.offsets[static_cast<size_t>(it - columns.begin())] + term.coordinate,
-              static_cast<Eigen::Index>(i)) += term.weight;
+      const auto k = static_cast<size_t>(unknowns.numbers.at(term.block));
+      weights(unknowns.offsets[k] + term.coordinate, static_cast<Eigen::Index>(i)) += term.weight;
     }
   }
   CovarianceReport report;
-  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> solver(information);
-  if (solver.info() != Eigen::Success) return report;
-  const Eigen::MatrixXd X = solver.solve(weights);
-  if (solver.info() != Eigen::Success || !X.allFinite()) return report;
+  if (!normal->information.Factorize()) return report;
+  const Eigen::MatrixXd X = normal->information.Solve(weights);
+  if (!X.allFinite()) return report;
   report.covariance = weights.transpose() * X;
   report.covariance = 0.5 * (report.covariance + report.covariance.transpose()).eval();
   report.usable = (report.covariance.diagonal().array() > 0.0).all();
 
-  const Eigen::MatrixXd JX = J * X;
-  Eigen::Index row = 0;
-  for (size_t i = 0; i < factors.size(); ++i) {
-    const Eigen::Index rows = factors[i]->cost->num_residuals();
-    const Eigen::Map<const Eigen::VectorXd> r(linear.residuals.data() + row, rows);
-    report.influence[keys[i]] = JX.middleRows(row, rows).transpose() * r;
-    row += rows;
+  size_t f = 0;
+  for (const auto& entry : factors_) {
+    Eigen::VectorXd& influence = report.influence[entry.first];
+    influence.setZero(X.cols());
+    Eigen::Index column = 0;
+    for (const int k : unknowns.of_factors[f]) {
+      const int size = unknowns.sizes[static_cast<size_t>(k)];
+      influence += X.middleRows(unknowns.offsets[static_cast<size_t>(k)], size).transpose() *
+                   normal->gradients[f].segment(column, size);
+      column += size;
+    }
+    ++f;
   }
   return report;
 }
@@ -226,15 +293,29 @@ Linearization FactorGraph::Linearize(const std::vector<FactorKey>& keys) const {
   for (const FactorKey key : keys) factors.push_back(&factors_.at(key));
   Linearization result;
   result.blocks = BlocksOf(factors);
-  const SparseLinearization linear = EvaluateSparse(blocks_, factors, result.blocks);
-  result.offsets = linear.offsets;
-  result.residuals = Eigen::Map<const Eigen::VectorXd>(
-      linear.residuals.data(), static_cast<Eigen::Index>(linear.residuals.size()));
-  result.J = Eigen::MatrixXd::Zero(linear.J.num_rows, linear.offsets.back());
-  for (int row = 0; row < linear.J.num_rows; ++row) {
-    for (int k = linear.J.rows[row]; k < linear.J.rows[row + 1]; ++k) {
-      result.J(row, linear.J.cols[k]) = linear.J.values[k];
+  int rows = 0, columns = 0;
+  for (const BlockId& id : result.blocks) {
+    result.offsets.push_back(columns);
+    columns += blocks_.at(id).tangent_size();
+  }
+  result.offsets.push_back(columns);
+  for (const Factor* factor : factors) rows += factor->cost->num_residuals();
+  result.residuals.resize(rows);
+  result.J = Eigen::MatrixXd::Zero(rows, columns);
+  LinearFactor linear;
+  Eigen::Index row = 0;
+  for (const Factor* factor : factors) {
+    CHECK(Evaluate(blocks_, *factor, &linear)) << "a factor could not be evaluated";
+    result.residuals.segment(row, linear.residuals.size()) = linear.residuals;
+    Eigen::Index column = 0;
+    for (const BlockId& id : factor->blocks) {
+      const auto k = std::lower_bound(result.blocks.begin(), result.blocks.end(), id);
+      const int size = blocks_.at(id).tangent_size();
+      result.J.block(row, result.offsets[static_cast<size_t>(k - result.blocks.begin())],
+                     linear.J.rows(), size) = linear.J.middleCols(column, size);
+      column += size;
     }
+    row += linear.J.rows();
   }
   return result;
 }
@@ -271,9 +352,7 @@ int FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
         const int size =
             block.geometry == Geometry::kRotation ? 3 : static_cast<int>(block.value.size());
         for (int c = 0; c < size; ++c) {
-          const bool constant =
-              std::find(block.constant.begin(), block.constant.end(), c) != block.constant.end();
-          order.push_back(constant ? -1 : column++);
+          order.push_back(IsConstant(block, c) ? -1 : column++);
         }
       }
     }

@@ -1,4 +1,4 @@
-// Parameter blocks and factors under stable names: the only place where a ceres::Problem exists.
+// Parameter blocks and factors under stable names, and the solver for them.
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_FACTOR_GRAPH_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_FACTOR_GRAPH_H_
 
@@ -14,7 +14,7 @@
 
 namespace camgyro {
 
-// What a block is. Order of the enumeration and of the index is the order of solving.
+// What a block is. The solver eliminates from the last kind and index to the first.
 enum class BlockKind { kLens, kShutter, kRotation, kEffects, kBias, kRates, kDirection, kTurn };
 
 struct BlockId {
@@ -52,7 +52,7 @@ struct Factor {
 
 struct SolveOptions {
   int max_iterations = 10;
-  // Stops when an iteration lowers the cost by less than this fraction of it.
+  // Stops when the next step would lower the cost by less than this fraction of it.
   double function_tolerance = 1e-6;
 };
 
@@ -89,7 +89,7 @@ class FactorGraph {
   const std::map<BlockId, Block>& blocks() const { return blocks_; }
   const std::map<FactorKey, Factor>& factors() const { return factors_; }
 
-  // Levenberg-Marquardt on all factors (Ceres, sparse normal Cholesky, one thread: repeatable).
+  // Levenberg-Marquardt on all factors (normal equations, one thread: repeatable).
   SolveReport Solve(const SolveOptions& options);
 
   // Linear functionals of the state with their covariance. Row i of a functional is the sum over
@@ -118,6 +118,8 @@ class FactorGraph {
   int Marginalize(const std::vector<BlockId>& leaving, const std::vector<FactorKey>& also = {});
 
  private:
+  std::vector<const Factor*> AllFactors() const;
+
   std::map<BlockId, Block> blocks_;
   std::map<FactorKey, Factor> factors_;
   FactorKey next_key_ = 0;

@@ -444,21 +444,20 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
     return SymmetricTransfer(pair.measurement).IndependentResiduals(p.data());
   }
   const RotationChain chain(m.rate_times_s, GatherRates(m, groups.data()));
-  PairBearings bearings;
   if (!EvaluatePairBearings(m, chain, graph_.value(kLensBlock).data(),
                             graph_.value(kShutterBlock).data(), graph_.value(kRotationBlock).data(),
-                            EffectsNow().values, false, &bearings)) {
+                            EffectsNow().values, false, &bearings_)) {
     return residuals;
   }
   if (options_.residual != ResidualKind::kPlane) {
-    return FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold).residuals;
+    return FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold).residuals;
   }
   const Eigen::Vector3d tau = graph_.value(DirectionBlock(id)), turn = graph_.value(TurnBlock(id));
   double cost = 0.0;
   for (size_t i = 0; i < m.matches.size(); ++i) {
     const double share = CoplanarityPlane::RowShare(m, m.matches[i]);
-    residuals.push_back(EvaluatePlaneResidual(bearings.a[i].ray_ref, bearings.a[i].J_ray_px,
-                                              bearings.b[i].ray_ref, bearings.b[i].J_ray_px,
+    residuals.push_back(EvaluatePlaneResidual(bearings_.a[i].ray_ref, bearings_.a[i].J_ray_px,
+                                              bearings_.b[i].ray_ref, bearings_.b[i].J_ray_px,
                                               tau + share * turn, m.variance_a(), m.variance_b())
                             .value);
     const double robust = Robustify(residuals.back(), m.robust_threshold).value;
@@ -466,8 +465,8 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   }
   if (search) {
     const DirectionEstimate found =
-        FindDirection(bearings, m.variance_a(), m.variance_b(), m.robust_threshold);
-    cost += CostOfPointsBehind(bearings, m.variance_a(), m.variance_b(), m.robust_threshold, tau);
+        FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold);
+    cost += CostOfPointsBehind(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold, tau);
     if (found.cost < cost) {
       graph_.value(DirectionBlock(id)) = found.tau;
       graph_.value(TurnBlock(id)).setZero();

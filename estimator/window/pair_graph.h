@@ -165,6 +165,7 @@ class PairGraph {
   std::map<int64_t, RateGroup> groups_;  // by id, in time order
   int64_t next_group_ = 0;
   std::map<int64_t, Pair> pairs_;
+  PairBearings bearings_;  // of Residuals, which are called often: kept allocated
 };
 
 }  // namespace camgyro
