@@ -10,11 +10,12 @@ namespace {
 
 // The picture shifts in proportion to the rotation above a corner frequency, about the camera's x
 // and y axes: angle' = omega - 2 pi corner angle, exact for rates that are linear between samples
-// up to the second order of the step. The shift is in px per rad: gain * f.
+// up to the second order of the step. The shift is in px per rad: gain * f. Stabilisers have gains
+// of 0.3 and more: a few px per rad are something else.
 class OpticalStabilisation final : public Effect {
  public:
   OpticalStabilisation(const EffectSetup& setup, double corner_hz)
-      : Effect({{"shift_per_rad", "px/rad", 500.0, 0.0, 1e4}}),
+      : Effect({{"shift_per_rad", "px/rad", 500.0, 30.0, 1e4}}),
         times_s_(setup.gyro_times_s),
         delay_s_(setup.delay_s),
         readout_s_(setup.readout_s) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 
 #include "core/so3.h"
 #include "estimator/diagnosis/diagnose.h"
@@ -283,7 +284,7 @@ class Loop {
     for (auto& [r, candidate] : all) {
       if (r.p_value * tests > options_.significance) {
         r.rejected = "not significant";
-      } else if (!IsSure(r.gain, r.inflation, 2.0)) {
+      } else if (!IsSure(r.gain, r.inflation)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
     }
@@ -299,14 +300,13 @@ class Loop {
     return added;
   }
 
-  // A gain beyond its noise: beyond so many times its scatter from block to block or, where the
+  // A gain beyond its noise: beyond twice its scatter from block to block or, where the
   // effect acts in some blocks only (a step early in the recording) so that the scatter is the
   // effect itself, beyond twice the noise that the gain of a right effect has, 2 sqrt(gain),
   // inflated as the test; a right effect then makes hardly any block worse.
-  static bool IsSure(const Gain& gain, double inflation, double scatter) {
+  static bool IsSure(const Gain& gain, double inflation) {
     const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, inflation));
-    return gain.sum > scatter * gain.sigma ||
-           (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
+    return gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -355,12 +355,36 @@ class Loop {
     return scores;
   }
 
-  // Pairs in the order of time, as the search for a step needs them.
+  // Both shares in the order of time. Two blocks that follow each other become one: what wanders
+  // slowly is alike in neighbours, and blocks are to scatter independently.
   static Scores Joint(const Scores& fit, const Scores& choice) {
     Scores both = fit;
-    both.blocks.insert(both.blocks.end(), choice.blocks.begin(), choice.blocks.end());
+    std::vector<BlockScore> blocks = fit.blocks;
+    blocks.insert(blocks.end(), choice.blocks.begin(), choice.blocks.end());
+    std::vector<size_t> order(blocks.size()), rank(blocks.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(),
+              [&](size_t i, size_t j) { return blocks[i].time_s < blocks[j].time_s; });
+    both.blocks.clear();
+    for (size_t k = 0; k < order.size(); ++k) {
+      const BlockScore& block = blocks[order[k]];
+      rank[order[k]] = k / 2;
+      if (k % 2 == 0) {
+        both.blocks.push_back(block);
+        continue;
+      }
+      BlockScore& sum = both.blocks.back();
+      sum.pairs += block.pairs;
+      sum.residuals += block.residuals;
+      sum.chi2 += block.chi2;
+      sum.g += block.g;
+      sum.H += block.H;
+    }
+    for (PairScore& pair : both.pairs) {
+      pair.block = static_cast<int>(rank[static_cast<size_t>(pair.block)]);
+    }
     for (PairScore pair : choice.pairs) {
-      pair.block += static_cast<int>(fit.blocks.size());
+      pair.block = static_cast<int>(rank[fit.blocks.size() + static_cast<size_t>(pair.block)]);
       both.pairs.push_back(std::move(pair));
     }
     std::sort(both.pairs.begin(), both.pairs.end(),
@@ -465,8 +489,7 @@ class Loop {
           r.rejected = p.name + " outside of what real devices show";
         }
       }
-      // The refit's gain is that of one share, of half of the frames: it confirms.
-      if (r.rejected.empty() && !IsSure(r.gain, r.inflation, 1.0)) {
+      if (r.rejected.empty() && !IsSure(r.gain, r.inflation)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
       if (r.rejected.empty() &&
