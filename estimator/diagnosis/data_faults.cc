@@ -142,11 +142,10 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
 
 std::optional<std::string> FindElectronicStabilisation(
     const Recording& recording, const std::vector<CameraRotation>& rotations) {
-  // Mean rates between neighbouring frames, of the camera and, whatever the delay, of the gyro.
+  // Mean rates over the rotations, of the camera and, whatever the delay, of the gyro.
   std::vector<Eigen::Vector3d> camera, gyro;
   double interval_s = 0.0;
   for (const CameraRotation& rotation : rotations) {
-    if (rotation.frame_b != rotation.frame_a + 1) continue;
     const double dt =
         SecondsSince(recording.frames[static_cast<size_t>(rotation.frame_a)].stamp_ns,
                      recording.frames[static_cast<size_t>(rotation.frame_b)].stamp_ns);

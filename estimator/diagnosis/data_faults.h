@@ -24,8 +24,8 @@ struct DataFault {
 std::vector<DataFault> FindDataFaults(const Recording& recording);
 
 // Is the picture without the fast rotation that the gyro has? Compares the power of the rates below
-// 0.5 Hz and above 1 Hz, which needs neither delay nor mounting. `rotations`: of the camera,
-// between neighbouring frames. The finding, or nothing.
+// 0.5 Hz and above 1 Hz, which needs neither delay nor mounting. `rotations`: of the camera, some
+// 0.1 s long or shorter, at least 60. The finding, or nothing.
 std::optional<std::string> FindElectronicStabilisation(
     const Recording& recording, const std::vector<CameraRotation>& rotations);
 

@@ -5,9 +5,9 @@
 namespace camgyro {
 namespace {
 
-// Rotations between neighbouring frames, whatever the recording has.
-std::vector<CameraRotation> NeighbourRotations(const Recording& recording,
-                                               const CameraRotationsAtFocal& rotations_at) {
+// Rotations of the camera, whatever the recording has.
+std::vector<CameraRotation> CameraRotationsIn(const Recording& recording,
+                                              const CameraRotationsAtFocal& rotations_at) {
   if (recording.matches.empty() && recording.tracks.empty()) {
     std::vector<CameraRotation> rotations;
     for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
@@ -43,7 +43,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
       diagnosis.faults.push_back(*repaired);
       before = CalibrateRecording(recording, rotations_at, options.calibrate, progress);
     } else {
-      const std::vector<CameraRotation> rotations = NeighbourRotations(recording, rotations_at);
+      const std::vector<CameraRotation> rotations = CameraRotationsIn(recording, rotations_at);
       std::optional<std::string> found = FindElectronicStabilisation(recording, rotations);
       if (recording.declared_stabilisation) {
         found = "the file says so (" + *recording.declared_stabilisation + ")" +

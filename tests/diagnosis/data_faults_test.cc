@@ -135,5 +135,18 @@ TEST(DataFaults, ElectronicStabilisation) {
   EXPECT_THAT(*found, HasSubstr("above 1 Hz"));
 }
 
+// As the program finds them: from the tracks, 0.1 s apart.
+TEST(DataFaults, ElectronicStabilisationInTheRotationsThatTheStartUses) {
+  const std::string stabiliser = "effects.electronic_stabilisation={strength: 1, smoothing_s: 0.5}";
+  for (const bool stabilised : {false, true}) {
+    std::vector<std::string> overrides = {"duration_s=20", "motion.kind=walking"};
+    if (stabilised) overrides.push_back(stabiliser);
+    const auto s = Simulate(overrides);
+    const std::vector<CameraRotation> rotations =
+        CameraRotationsOf(PairsForRotations(s.recording), s.recording.camera, s.truth.lens[kFocal]);
+    EXPECT_EQ(FindElectronicStabilisation(s.recording, rotations).has_value(), stabilised);
+  }
+}
+
 }  // namespace
 }  // namespace camgyro
