@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
 #include "core/so3.h"
 #include "estimator/diagnosis/diagnose.h"
@@ -266,7 +265,7 @@ class Loop {
     const std::vector<double> without = gain_of_step({});
     // Significance by both shares: what was fitted is projected out of the scores, which makes
     // those of the fit's own frames as good as unseen ones.
-    const Scores both = Joint(fit, choice);
+    const Scores both = MergeShares(fit, choice);
     std::vector<std::pair<CandidateResult, Candidate>> all;
     for (const Candidate& candidate : candidates) {
       const ScoreTest test = TestColumns(both, candidate.columns(), fit_prior);
@@ -344,52 +343,6 @@ class Loop {
     gain.sum = (found.test.statistic - 1.0) * inflation;
     gain.sigma = std::sqrt(2.0 + 4.0 * found.test.statistic) / 2.0 * inflation;
     all->emplace_back(MakeResult(candidate, found.test, gain), candidate);
-  }
-
-  static Scores FirstColumns(Scores scores, Eigen::Index columns) {
-    for (BlockScore& block : scores.blocks) {
-      block.g.conservativeResize(columns);
-      block.H.conservativeResize(columns, columns);
-    }
-    for (PairScore& pair : scores.pairs) pair.g.conservativeResize(columns);
-    return scores;
-  }
-
-  // Both shares in the order of time. Two blocks that follow each other become one: what wanders
-  // slowly is alike in neighbours, and blocks are to scatter independently.
-  static Scores Joint(const Scores& fit, const Scores& choice) {
-    Scores both = fit;
-    std::vector<BlockScore> blocks = fit.blocks;
-    blocks.insert(blocks.end(), choice.blocks.begin(), choice.blocks.end());
-    std::vector<size_t> order(blocks.size()), rank(blocks.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(),
-              [&](size_t i, size_t j) { return blocks[i].time_s < blocks[j].time_s; });
-    both.blocks.clear();
-    for (size_t k = 0; k < order.size(); ++k) {
-      const BlockScore& block = blocks[order[k]];
-      rank[order[k]] = k / 2;
-      if (k % 2 == 0) {
-        both.blocks.push_back(block);
-        continue;
-      }
-      BlockScore& sum = both.blocks.back();
-      sum.pairs += block.pairs;
-      sum.residuals += block.residuals;
-      sum.chi2 += block.chi2;
-      sum.g += block.g;
-      sum.H += block.H;
-    }
-    for (PairScore& pair : both.pairs) {
-      pair.block = static_cast<int>(rank[static_cast<size_t>(pair.block)]);
-    }
-    for (PairScore pair : choice.pairs) {
-      pair.block = static_cast<int>(rank[fit.blocks.size() + static_cast<size_t>(pair.block)]);
-      both.pairs.push_back(std::move(pair));
-    }
-    std::sort(both.pairs.begin(), both.pairs.end(),
-              [](const PairScore& a, const PairScore& b) { return a.time_s < b.time_s; });
-    return both;
   }
 
   void AddTurnCandidate(const EffectSetup& setup, const Scores& choice,

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <unsupported/Eigen/SpecialFunctions>
 
 namespace camgyro {
@@ -153,6 +154,50 @@ ScoreTest Judge(const Effective& e, const Eigen::VectorXd& prior) {
 }
 
 }  // namespace
+
+Scores FirstColumns(Scores scores, Eigen::Index columns) {
+  for (BlockScore& block : scores.blocks) {
+    block.g.conservativeResize(columns);
+    block.H.conservativeResize(columns, columns);
+  }
+  for (PairScore& pair : scores.pairs) pair.g.conservativeResize(columns);
+  return scores;
+}
+
+Scores MergeShares(const Scores& first, const Scores& second) {
+  Scores both = first;
+  std::vector<BlockScore> blocks = first.blocks;
+  blocks.insert(blocks.end(), second.blocks.begin(), second.blocks.end());
+  std::vector<size_t> order(blocks.size()), rank(blocks.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(),
+            [&](size_t i, size_t j) { return blocks[i].time_s < blocks[j].time_s; });
+  both.blocks.clear();
+  for (size_t k = 0; k < order.size(); ++k) {
+    const BlockScore& block = blocks[order[k]];
+    rank[order[k]] = k / 2;
+    if (k % 2 == 0) {
+      both.blocks.push_back(block);
+      continue;
+    }
+    BlockScore& sum = both.blocks.back();
+    sum.pairs += block.pairs;
+    sum.residuals += block.residuals;
+    sum.chi2 += block.chi2;
+    sum.g += block.g;
+    sum.H += block.H;
+  }
+  for (PairScore& pair : both.pairs) {
+    pair.block = static_cast<int>(rank[static_cast<size_t>(pair.block)]);
+  }
+  for (PairScore pair : second.pairs) {
+    pair.block = static_cast<int>(rank[first.blocks.size() + static_cast<size_t>(pair.block)]);
+    both.pairs.push_back(std::move(pair));
+  }
+  std::sort(both.pairs.begin(), both.pairs.end(),
+            [](const PairScore& a, const PairScore& b) { return a.time_s < b.time_s; });
+  return both;
+}
 
 double ChiSquareTail(double value, double dof) {
   const Eigen::Array<double, 1, 1> a(0.5 * dof), x(0.5 * std::max(0.0, value));

@@ -9,6 +9,12 @@
 
 namespace camgyro {
 
+Scores FirstColumns(Scores scores, Eigen::Index columns);
+// Two shares with the same columns as one, pairs in the order of time. Two blocks that follow each
+// other become one: what wanders slowly is alike in neighbours, and blocks are to scatter
+// independently.
+Scores MergeShares(const Scores& first, const Scores& second);
+
 // Score (Lagrange multiplier) test of some columns, the model's own columns projected out.
 struct ScoreTest {
   // chi-square of the columns over the inflation; F-distributed times `dof` under the model.

@@ -62,6 +62,33 @@ TEST(ScoreTest, TailsAreThoseOfTheTables) {
 }
 
 // What the state explains is not an effect: a wrong focal length and delay do not show.
+TEST(ScoreTest, MergesNeighbouringBlocksOfTwoShares) {
+  Scores first = LinearScores(1, Eigen::VectorXd::Zero(kStateSize + 3)), second = first;
+  for (BlockScore& block : second.blocks) block.time_s += 0.5;
+  for (PairScore& pair : second.pairs) pair.time_s += 0.5;
+  const Scores both = MergeShares(first, second);
+  ASSERT_EQ(both.blocks.size(), 12u);
+  EXPECT_EQ(both.pairs.size(), 480u);
+  for (size_t b = 0; b < 12; ++b) {
+    EXPECT_TRUE(both.blocks[b].g.isApprox(2.0 * first.blocks[b].g));
+    EXPECT_TRUE(both.blocks[b].H.isApprox(2.0 * first.blocks[b].H));
+    EXPECT_EQ(both.blocks[b].pairs, 40);
+    EXPECT_EQ(both.blocks[b].residuals, 1200);
+  }
+  for (size_t i = 0; i < both.pairs.size(); ++i) {
+    if (i > 0) {
+      EXPECT_LE(both.pairs[i - 1].time_s, both.pairs[i].time_s);
+    }
+    // Pair times of a block run from its number on, and half a second later in the second share.
+    EXPECT_NEAR(both.pairs[i].time_s - both.pairs[i].block, 0.73, 0.74);
+  }
+  const Scores state = FirstColumns(both, kStateSize);
+  EXPECT_EQ(state.blocks[0].g.size(), kStateSize);
+  EXPECT_EQ(state.blocks[0].H.cols(), kStateSize);
+  EXPECT_EQ(state.pairs[0].g.size(), kStateSize);
+  EXPECT_EQ(state.pairs[0].g, both.pairs[0].g.head<kStateSize>());
+}
+
 TEST(ScoreTest, IsUniformUnderTheModelWhateverTheState) {
   Eigen::VectorXd truth = Eigen::VectorXd::Zero(kStateSize + 3);
   truth[kStateFocal] = 0.5;
