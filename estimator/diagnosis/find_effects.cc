@@ -292,7 +292,8 @@ class Loop {
       return a.first.gain.sum > b.first.gain.sum;
     });
     bool added = false;
-    if (may_add && !all.empty() && all.front().first.rejected.empty()) {
+    if (may_add && !all.empty() &&
+        (all.front().first.rejected.empty() || (round == 0 && HasRunAway(fit_.calibration)))) {
       added = Contest(round, choice, noise, &all, result);
     }
     for (auto& entry : all) result->candidates.push_back(std::move(entry.first));
