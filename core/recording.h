@@ -36,8 +36,8 @@ struct Frame {
 struct TrackedPoint {
   int64_t track_id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();  // pixel (0,0) is the centre of the top-left pixel
-  // Lower triangular factor L (xx, yx, yy) of its noise: covariance sigma^2 L L^T, with the sigma of
-  // the recording's noise. Corners are found less well along an edge, or along motion blur.
+  // Lower triangular factor L (xx, yx, yy) of its noise: covariance sigma^2 L L^T, with the sigma
+  // of the recording's noise. Corners are found less well along an edge, or along motion blur.
   Eigen::Vector3d noise_factor{1.0, 0.0, 1.0};
 };
 

@@ -50,11 +50,12 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
       const Eigen::Vector3d tau = plane.tau + share * plane.turn;
       row.residual_px = sigmas * noise_px;
       row.inlier = std::abs(sigmas) <= options.inlier_sigmas();
-      // tau . (a x b) = (tau x a) . b moves with px_b, in units of its noise, as this gradient says.
+      // tau . (a x b) = (tau x a) . b moves with px_b, in units of its noise, as this gradient
+      // says.
       const Eigen::Vector2d gradient = b.J_ray_px.transpose() * tau.cross(a.ray_ref);
       if (gradient.squaredNorm() > 0.0) {
-        row.correction_px =
-            -tau.dot(a.ray_ref.cross(b.ray_ref)) / gradient.squaredNorm() * (b.noise_factor * gradient);
+        row.correction_px = -tau.dot(a.ray_ref.cross(b.ray_ref)) / gradient.squaredNorm() *
+                            (b.noise_factor * gradient);
       }
       residuals.push_back(row);
     }
