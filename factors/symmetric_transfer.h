@@ -27,7 +27,7 @@ namespace camgyro {
 // Valid       while every pixel has a ray and its transfer a pixel; otherwise the step is rejected.
 //             Neglects translation: it is for comparison, and for scenes so far away that parallax
 //             does not show. Also neglects: that noise in v moves the row's time; local scale of
-//             the transfer, and effects (CHECKed)
+//             the transfer, TrackedPoint::noise_factor, and effects (CHECKed)
 // Source      Ovren & Forssen, Gyroscope-based video stabilisation with auto-calibration, ICRA 2015
 class SymmetricTransfer final : public ceres::CostFunction {
  public:

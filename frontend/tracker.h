@@ -44,9 +44,10 @@ struct TrackerOptions {
 //
 // How the noise lies (TrackedPoint::noise_factor): the inverse of the template patch's structure
 // tensor, over that of the typical corner in the first pair of frames. Measured on a rendered video
-// against its truth: sigma = 0.69 to 0.90 lambda^-1/2 px over a factor of 16 in the eigenvalue
-// lambda (grey^2 / px^2), 0.04 to 0.16 px. Motion blur makes the noise along the motion up to twice
-// as large as across; taken for alike, it shifts f by 0.2 to 0.3 % (five sigmas).
+// against its truth (a throw-away program, no command): sigma = 0.69 to 0.90 lambda^-1/2 px over a
+// factor of 16 in the eigenvalue lambda (grey^2 / px^2), 0.04 to 0.16 px. Motion blur makes the
+// noise along the motion up to twice as large as across; taken for alike, it shifts f by 0.2 to 0.3
+// % (five sigmas).
 //
 // Exposure: where the points show that it changed, the frame is searched once more with the
 // brightness of the one before, if the first search finds 20. With every other frame 20 % darker,

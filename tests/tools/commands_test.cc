@@ -30,6 +30,18 @@ video: {format: mp4}
 
 using CommandsTest = CamgyroTest;
 
+// That of kHandheld, with sigmas that mean something.
+void ExpectTheTruth(const YAML::Node& calibration) {
+  const auto expect_near = [](const YAML::Node& node, double truth, double most_sigma) {
+    const double sigma = node["sigma"].as<double>();
+    EXPECT_LT(sigma, most_sigma);
+    EXPECT_NEAR(node["value"].as<double>(), truth, 5.0 * sigma);
+  };
+  expect_near(calibration["camera"]["focal_px"], 290.0, 3.0);
+  expect_near(calibration["shutter"]["readout_s"], 0.020, 0.001);
+  expect_near(calibration["clock"]["delay_s"], 0.015, 0.001);
+}
+
 TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
   Simulate(kHandheld, "a");
   const RunResult run = Run("calibrate a --out=result");
@@ -40,14 +52,7 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
 
   const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
   EXPECT_THAT(result["camera"]["resolution"].as<std::vector<int>>(), ElementsAreArray({320, 240}));
-  const auto expect_near = [](const YAML::Node& node, double truth, double most_sigma) {
-    const double sigma = node["sigma"].as<double>();
-    EXPECT_LT(sigma, most_sigma);
-    EXPECT_NEAR(node["value"].as<double>(), truth, 5.0 * sigma);
-  };
-  expect_near(result["camera"]["focal_px"], 290.0, 3.0);
-  expect_near(result["shutter"]["readout_s"], 0.020, 0.001);
-  expect_near(result["clock"]["delay_s"], 0.015, 0.001);
+  ExpectTheTruth(result);
   EXPECT_EQ(result["camera"]["principal_px"]["value"].size(), 2u);
   EXPECT_EQ(result["camera"]["aspect_ratio"]["sigma"].as<double>(), 0.0);
   EXPECT_EQ(result["camera"]["distortion"]["model"].as<std::string>(), "none");
@@ -88,14 +93,7 @@ TEST_F(CommandsTest, CalibrateByTransfersWhereTheSceneIsFar) {
   const RunResult run = Run("calibrate a --residual=transfer --out=result");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
-  const auto expect_near = [](const YAML::Node& node, double truth, double most_sigma) {
-    const double sigma = node["sigma"].as<double>();
-    EXPECT_LT(sigma, most_sigma);
-    EXPECT_NEAR(node["value"].as<double>(), truth, 5.0 * sigma);
-  };
-  expect_near(result["camera"]["focal_px"], 290.0, 3.0);
-  expect_near(result["shutter"]["readout_s"], 0.020, 0.001);
-  expect_near(result["clock"]["delay_s"], 0.015, 0.001);
+  ExpectTheTruth(result);
   EXPECT_NEAR(result["quality"]["noise_px"].as<double>(), 0.2, 0.02);
   EXPECT_NEAR(result["quality"]["unseen_rms_px"].as<double>(),
               result["quality"]["rms_px"].as<double>(), 0.02);
