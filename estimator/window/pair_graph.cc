@@ -299,11 +299,12 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
     blocks.push_back(DirectionBlock(id));
     graph_.AddBlock(TurnBlock(id), {Geometry::kEuclidean, Eigen::Vector3d::Zero(), {}});
     blocks.push_back(TurnBlock(id));
-    const double turn_sigma = TurnSigma(turn_sigma_rad_s_, graph_.value(kShutterBlock)[kReadout]);
-    graph_.AddFactor(std::make_shared<MarginalPrior>(
-                         std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(3), false}},
-                         Eigen::MatrixXd::Identity(3, 3) / turn_sigma, Eigen::VectorXd::Zero(3)),
-                     {TurnBlock(id)});
+    pair.turn_sigma_rad = TurnSigma(turn_sigma_rad_s_, graph_.value(kShutterBlock)[kReadout]);
+    graph_.AddFactor(
+        std::make_shared<MarginalPrior>(
+            std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(3), false}},
+            Eigen::MatrixXd::Identity(3, 3) / pair.turn_sigma_rad, Eigen::VectorXd::Zero(3)),
+        {TurnBlock(id)});
   }
   if (num_effects_ > 0) blocks.push_back(kEffectsBlock);
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
@@ -476,6 +477,33 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   return residuals;
 }
 
+CrossFit PairGraph::CrossFitOf(int64_t id) {
+  CrossFit fit;
+  if (options_.residual != ResidualKind::kPlane || pairs_.at(id).measurement == nullptr) return fit;
+  const std::vector<double> own = Residuals(id, /*search=*/false);  // fills the bearings, too
+  if (own.size() < 2 * kMinMatches) return fit;
+  const Pair& pair = pairs_.at(id);
+  PairView view;
+  view.measurement = *pair.measurement;
+  view.bearings = bearings_;
+  view.turn_sigma_rad = pair.turn_sigma_rad;
+  const auto bounded_sq = [&](double r) {
+    return std::pow(Robustify(r, options_.robust_threshold).value, 2);
+  };
+  for (const double r : own) fit.own += bounded_sq(r);
+  const auto n = static_cast<double>(own.size());
+  const double lost = CountsOf(options_.residual).lost_per_pair;
+  fit.own *= n / (n - lost);
+  fit.expected = fit.own * (1.0 + lost / (0.5 * n));
+  for (const size_t half : {0, 1}) {
+    const PairPlane plane = FitPlane(view, half, 2);
+    for (size_t i = 1 - half; i < own.size(); i += 2) {
+      fit.unseen += bounded_sq(ResidualOf(view, plane, i).value);
+    }
+  }
+  return fit;
+}
+
 Calibration PairGraph::Estimate() const {
   Calibration c = prior_mean_;
   c.lens = graph_.value(kLensBlock);
@@ -494,7 +522,8 @@ Calibration PairGraph::Estimate() const {
   return c;
 }
 
-bool PairGraph::EstimateCovariance(double cluster_s, Calibration* calibration) const {
+bool PairGraph::EstimateCovariance(double cluster_s, double inflation,
+                                   Calibration* calibration) const {
   const int size = kStateSize + num_effects_;
   std::vector<FactorGraph::Functional> functionals(static_cast<size_t>(size));
   functionals[kStateFocal] = {{kLensBlock, 0}};
@@ -531,14 +560,14 @@ bool PairGraph::EstimateCovariance(double cluster_s, Calibration* calibration) c
     add(entry.second.factor, sample(entry.second.first_sample).time_s - calibration->delay_s);
   }
   const auto count = static_cast<double>(clusters.size());
-  Eigen::MatrixXd covariance = report.covariance;
+  Eigen::MatrixXd covariance = inflation * report.covariance;
   if (clusters.size() >= 8) {
     Eigen::VectorXd variance = Eigen::VectorXd::Zero(size);
     for (const auto& entry : clusters) variance += entry.second.cwiseAbs2();
     variance *= count / (count - 1.0);
-    const Eigen::VectorXd inflation =
+    const Eigen::VectorXd wider =
         (variance.cwiseQuotient(covariance.diagonal())).cwiseMax(1.0).cwiseSqrt();
-    covariance = inflation.asDiagonal() * covariance * inflation.asDiagonal();
+    covariance = wider.asDiagonal() * covariance * wider.asDiagonal();
   }
   calibration->covariance = covariance.topLeftCorner<kStateSize, kStateSize>();
   calibration->effect_covariance = covariance.bottomRightCorner(num_effects_, num_effects_);

@@ -4,6 +4,7 @@
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_PAIR_GRAPH_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_PAIR_GRAPH_H_
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -62,6 +63,30 @@ struct TimedRate {
   bool saturated = false;  // at the gyro's full scale: no pair may need it
 };
 
+// Sums of squared residuals, bounded as by the loss, of matches that had a say in their pair's
+// direction and of the same matches without one. A direction that is the best of many which all say
+// little takes more of the variance than its degrees of freedom, and where it takes noise for a
+// direction, the information that is left is too large by as much.
+struct CrossFit {
+  double own = 0.0;       // under the pair's direction and turn, corrected for degrees of freedom
+  double expected = 0.0;  // of the next, where every direction is well determined
+  double unseen = 0.0;    // each half of the matches under direction and turn of the other half
+
+  CrossFit& operator+=(const CrossFit& other) {
+    own += other.own;
+    expected += other.expected;
+    unseen += other.unseen;
+    return *this;
+  }
+  CrossFit operator*(double factor) const {
+    return {factor * own, factor * expected, factor * unseen};
+  }
+  // By how much to widen the covariance of what the pairs determine (>= 1).
+  double inflation() const {
+    return own > 0.0 ? std::max(1.0, unseen / own) * std::max(1.0, unseen / expected) : 1.0;
+  }
+};
+
 enum class AddPairResult {
   kAdded,
   kGyroTooLate,    // the samples do not reach to the end of the pair yet
@@ -103,6 +128,9 @@ class PairGraph {
   // of a rotation). With `search`, its direction is first searched anew, and stored if it is
   // better. Empty if a ray is missing.
   std::vector<double> Residuals(int64_t id, bool search);
+  // The same residuals under the pair's own direction, and each under the direction that fits the
+  // other half of the matches: see CrossFit.
+  CrossFit CrossFitOf(int64_t id);
   // Sets the noise of a pair already in the graph: pixels, or radians of a rotation.
   void SetSigma(int64_t id, double sigma);
   PairGraphOptions* options() { return &options_; }
@@ -111,7 +139,8 @@ class PairGraph {
   // covariance where that is larger; `cluster_s` is the length of a cluster, and there must be at
   // least 8 of them. The bias is the mean over its blocks.
   Calibration Estimate() const;
-  bool EstimateCovariance(double cluster_s, Calibration* calibration) const;
+  // `inflation` (>= 1): of the graph's covariance, before that.
+  bool EstimateCovariance(double cluster_s, double inflation, Calibration* calibration) const;
 
   const FactorGraph& graph() const { return graph_; }
 
@@ -130,6 +159,7 @@ class PairGraph {
     std::vector<int64_t> groups;
     FactorGraph::FactorKey factor = 0;
     double time_s = 0.0;
+    double turn_sigma_rad = 0.0;  // prior
   };
 
   // Null without effects that have parameters.

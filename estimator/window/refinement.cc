@@ -132,7 +132,9 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     const bool costs_settled = std::abs(report.final_cost - last_cost) < 2e-4 * report.final_cost;
     last_cost = report.final_cost;
     if (!costs_settled && !last) continue;
-    if (!graph->EstimateCovariance(options.cluster_s, &result.calibration)) {
+    CrossFit cross_fit;
+    for (const int64_t id : ids) cross_fit += graph->CrossFitOf(id);
+    if (!graph->EstimateCovariance(options.cluster_s, cross_fit.inflation(), &result.calibration)) {
       return CannotEstimate("the information matrix is singular");
     }
     FitQuality& q = result.quality;

@@ -82,7 +82,10 @@ void SlidingWindow::Process(const Pending& pair) {
   }
   UpdateNoise();
   Calibration estimate = graph_.Estimate();
-  if (!graph_.EstimateCovariance(/*cluster_s=*/2.0, &estimate)) {
+  // Of the last 100 pairs or so.
+  cross_fit_ = cross_fit_ * 0.99;
+  cross_fit_ += graph_.CrossFitOf(graph_.pair_ids().back());
+  if (!graph_.EstimateCovariance(/*cluster_s=*/2.0, cross_fit_.inflation(), &estimate)) {
     ++num_failed_solves_;
     return;
   }

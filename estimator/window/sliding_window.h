@@ -97,6 +97,7 @@ class SlidingWindow {
   int64_t next_pair_id_ = 0;
   int num_used_ = 0, num_skipped_ = 0, num_failed_solves_ = 0;
   double noise_px_ = 1.0;
+  CrossFit cross_fit_;
   bool settled_ = false;
 };
 

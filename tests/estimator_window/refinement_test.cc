@@ -173,6 +173,37 @@ TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
   EXPECT_EQ(residuals_of(3), -1);  // fewer than 8 left
 }
 
+// Directions that the parallax determines take their four degrees of freedom; the best of many that
+// all say nothing takes more, which widens the sigmas.
+TEST(PairGraph, DirectionsWithoutParallaxWidenTheSigmas) {
+  const auto inflation_of = [](Scenario scenario) {
+    scenario.tracks.count = 100;
+    const Simulated s = SimulateTracks(scenario).value();
+    const EstimationInput input = MakeEstimationInput(s.recording);
+    Calibration prior = s.truth;
+    prior.prior_sigma.setOnes();
+    PairGraphOptions options;
+    options.sigma_px = 0.7;
+    PairGraph graph(prior, prior, options);
+    for (const TimedRate& rate : input.rates) graph.AddRate(rate);
+    CrossFit sum;
+    for (const TimedPair& pair : input.pairs) {
+      if (graph.AddPair(pair.id, pair.first(), pair.second(), pair.matches) !=
+          AddPairResult::kAdded) {
+        continue;
+      }
+      graph.Residuals(pair.id, /*search=*/true);
+      sum += graph.CrossFitOf(pair.id);
+    }
+    EXPECT_NEAR(sum.expected / sum.own, 1.08, 0.02);  // 4 of some 50 in a half
+    return sum.inflation();
+  };
+  Scenario near = ShortScenario(4.0);
+  near.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  EXPECT_NEAR(inflation_of(near), 1.1, 0.06);
+  EXPECT_GT(inflation_of(FarScenario(4.0)), 1.2);
+}
+
 // Without loss the same wrong matches pull the calibration away; they are counted all the same.
 TEST(Refinement, WithoutLossWrongMatchesPull) {
   for (const ResidualKind kind : {ResidualKind::kPlane, ResidualKind::kSymmetricTransfer}) {
