@@ -158,6 +158,7 @@ class Loop {
   // its noise is projected out of the test. Time is spent on the refits.
   static constexpr int kLongestGap = 3;  // what comes and goes within frames is to be seen
   static constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
+  static constexpr double kOverwhelming = 1e-5;
   static constexpr double kAliasLimit = 0.95;
   static constexpr double kStrongMisfit = 0.02;  // gain of one effect over chi2
 
@@ -283,7 +284,7 @@ class Loop {
     for (auto& [r, candidate] : all) {
       if (r.p_value * tests > options_.significance) {
         r.rejected = "not significant";
-      } else if (!IsSure(r.gain, r.inflation)) {
+      } else if (!IsSure(r.gain, r.inflation, r.p_value * tests)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
     }
@@ -303,10 +304,14 @@ class Loop {
   // A gain beyond its noise: beyond twice its scatter from block to block or, where the
   // effect acts in some blocks only (a step early in the recording) so that the scatter is the
   // effect itself, beyond twice the noise that the gain of a right effect has, 2 sqrt(gain),
-  // inflated as the test; a right effect then makes hardly any block worse.
-  static bool IsSure(const Gain& gain, double inflation) {
+  // inflated as the test; a right effect then makes hardly any block worse. Where both shares
+  // together leave no doubt (p_value, corrected for the number of candidates), the half of the data
+  // that tells the gain only has to agree.
+  static bool IsSure(const Gain& gain, double inflation, double p_value) {
     const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, inflation));
-    return gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
+    const double sigmas = p_value < kOverwhelming ? 1.0 : 2.0;
+    return gain.sum > sigmas * gain.sigma ||
+           (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -443,7 +448,8 @@ class Loop {
           r.rejected = p.name + " outside of what real devices show";
         }
       }
-      if (r.rejected.empty() && !IsSure(r.gain, r.inflation)) {
+      if (r.rejected.empty() &&
+          !IsSure(r.gain, r.inflation, r.p_value * static_cast<double>(all->size()))) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
       if (r.rejected.empty() &&
