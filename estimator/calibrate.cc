@@ -281,6 +281,20 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     const double duration = input.pairs.back().time_b_s - input.pairs.front().time_a_s;
     refinement.cluster_s = std::clamp(duration / 12.0, 0.2, refinement.cluster_s);
     tell("refinement", 0.0);
+    const auto refine = [&](Calibration start, double noise) {
+      start.prior_sigma = prior.prior_sigma;
+      RefinementOptions again = refinement;
+      (attitudes ? again.sigma_rad : again.graph.sigma_px) = noise;
+      return Refine(input, input.pairs, start, prior, again);
+    };
+    if (from.effects != nullptr &&
+        std::any_of(from.effects->items().begin(), from.effects->items().end(),
+                    [](const auto& item) { return item.effect->depends_on_calibration(); })) {
+      const Result<Refined> first = Refine(input, input.pairs, from, prior, refinement);
+      if (!first) return tl::unexpected(first.error());
+      from = SettleEffects(recording, *first, refine).calibration;
+      from.prior_sigma = prior.prior_sigma;
+    }
     double halves_chi2 = 0.0;
     if (static_cast<int>(input.pairs.size()) >= kMinPairsForUnseen) {
       // Each half is fitted alone, and the other one tells how well. The pairs across the

@@ -310,8 +310,7 @@ class Loop {
   static bool IsSure(const Gain& gain, double inflation, double p_value) {
     const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, inflation));
     const double sigmas = p_value < kOverwhelming ? 1.0 : 2.0;
-    return gain.sum > sigmas * gain.sigma ||
-           (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
+    return gain.sum > sigmas * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -427,7 +426,12 @@ class Loop {
         const Result<Refined> other = Fit(anew, in_.noise);
         if (other && (!fit || FitChi2(*other) < FitChi2(*fit))) fit = other;
       }
-      if (fit) fit = Settle(*std::move(fit));
+      if (fit) {
+        fit = SettleEffects(*in_.recording, *std::move(fit), [this](Calibration from, double px) {
+          from.prior_sigma = in_.prior.prior_sigma;
+          return Fit(from, px);
+        });
+      }
       if (!fit) {
         r.rejected = "the fit with it failed: " + fit.error().message;
         continue;
@@ -512,40 +516,6 @@ class Loop {
         calibration.effect_covariance.block(item.first, item.first, n, n);
     const double statistic = value.dot(covariance.completeOrthogonalDecomposition().solve(value));
     return ChiSquareTail(statistic / std::max(1.0, inflation), n);
-  }
-
-  // Effects that depend on the calibration are made with the one that they led to, until it stays
-  // within a tenth of a sigma: what is left to gain by that would be taken for the next effect's.
-  Refined Settle(Refined fit) const {
-    constexpr int kMostTimes = 5;
-    for (int i = 0; i < kMostTimes && Remake(&fit.calibration); ++i) {
-      Calibration again = fit.calibration;
-      again.prior_sigma = in_.prior.prior_sigma;
-      Result<Refined> better = Fit(again, fit.quality.noise_px);
-      if (!better) break;
-      const StateVector moved = Difference(better->calibration, fit.calibration)
-                                    .cwiseQuotient(better->calibration.sigma());
-      fit = *std::move(better);
-      if (moved.cwiseAbs().maxCoeff() < 0.1) break;
-    }
-    return fit;
-  }
-
-  // Makes those effects anew that depend on the calibration; false if there are none.
-  bool Remake(Calibration* calibration) const {
-    auto set = std::make_shared<EffectSet>();
-    bool remade = false;
-    const EffectSetup setup = MakeEffectSetup(*in_.recording, *calibration);
-    for (const auto& item : calibration->effects->items()) {
-      std::shared_ptr<const Effect> effect = item.effect;
-      if (effect->depends_on_calibration()) {
-        effect = item.entry->make(setup, item.shape);
-        remade = true;
-      }
-      set->Add(item.entry, item.shape, effect);
-    }
-    calibration->effects = set;
-    return remade;
   }
 
   // Focal length 15 % or centre 5 % of the diagonal from where it all began.

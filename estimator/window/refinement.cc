@@ -29,6 +29,24 @@ double LargestShift(const std::vector<TimedPair>& pairs, const Calibration& a,
   return largest;
 }
 
+// Makes those effects anew that depend on the calibration; false if there are none.
+bool RemakeEffects(const Recording& recording, Calibration* calibration) {
+  if (calibration->effects == nullptr) return false;
+  auto set = std::make_shared<EffectSet>();
+  bool remade = false;
+  const EffectSetup setup = MakeEffectSetup(recording, *calibration);
+  for (const auto& item : calibration->effects->items()) {
+    std::shared_ptr<const Effect> effect = item.effect;
+    if (effect->depends_on_calibration()) {
+      effect = item.entry->make(setup, item.shape);
+      remade = true;
+    }
+    set->Add(item.entry, item.shape, effect);
+  }
+  calibration->effects = set;
+  return remade;
+}
+
 // How well matches fit.
 class FitSum {
  public:
@@ -150,6 +168,19 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     if (result.converged) break;
   }
   return result;
+}
+
+Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
+  constexpr int kMostTimes = 5;
+  for (int i = 0; i < kMostTimes && RemakeEffects(recording, &fit.calibration); ++i) {
+    Result<Refined> better = refit(fit.calibration, fit.quality.noise_px);
+    if (!better) break;
+    const StateVector moved =
+        Difference(better->calibration, fit.calibration).cwiseQuotient(better->calibration.sigma());
+    fit = *std::move(better);
+    if (moved.cwiseAbs().maxCoeff() < 0.1) break;
+  }
+  return fit;
 }
 
 UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,

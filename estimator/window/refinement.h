@@ -42,6 +42,12 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
                        const Calibration& start, const Calibration& prior_mean,
                        const RefinementOptions& options);
 
+// A fit with those effects made anew that depend on the calibration, and refitted, until it stays
+// within a tenth of a sigma: what is left to gain by that would be taken for another effect's.
+// `refit`: from a start, with the noise so far [px or rad]; where it fails, the last fit stands.
+using Refit = std::function<Result<Refined>(const Calibration& start, double noise)>;
+Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit);
+
 // Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
 // direction of each pair from every other match, residuals from the rest. A transfer has no
 // direction: residuals from all matches.
