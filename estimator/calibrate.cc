@@ -281,11 +281,11 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     const double duration = input.pairs.back().time_b_s - input.pairs.front().time_a_s;
     refinement.cluster_s = std::clamp(duration / 12.0, 0.2, refinement.cluster_s);
     tell("refinement", 0.0);
-    const auto refine = [&](Calibration start, double noise) {
-      start.prior_sigma = prior.prior_sigma;
+    const auto refine = [&](Calibration again_from, double noise) {
+      again_from.prior_sigma = prior.prior_sigma;
       RefinementOptions again = refinement;
       (attitudes ? again.sigma_rad : again.graph.sigma_px) = noise;
-      return Refine(input, input.pairs, start, prior, again);
+      return Refine(input, input.pairs, again_from, prior, again);
     };
     if (from.effects != nullptr &&
         std::any_of(from.effects->items().begin(), from.effects->items().end(),
