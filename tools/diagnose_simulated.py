@@ -17,6 +17,7 @@ import random
 import subprocess
 import tempfile
 import time
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
@@ -78,15 +79,15 @@ def run(options, case):
         begin = time.time()
         diagnosed = subprocess.run([options.camgyro, "diagnose", recording, "--out", out,
                                     "--quiet"], capture_output=True, text=True)
-        result = dict(case, exit=diagnosed.returncode, seconds=time.time() - begin, found=[],
-                      added=[], chi2="", unexplained=False, parameters="", size=None, ratio=None)
+        result = dict(case, seconds=time.time() - begin, tested=False, added=[], chi2="",
+                      unexplained=False, parameters="", size=None)
         shapes = {}
         if not os.path.exists(out + "/diagnosis.yaml"):
             result["failed"] = diagnosed.stderr.strip().split("\n")[-1]
         else:
             diagnosis = read(out + "/diagnosis.yaml")
             verdict, rounds = diagnosis["verdict"], diagnosis["rounds"]
-            result["found"] = verdict["effects"]
+            result["tested"] = bool(rounds)
             result["unexplained"] = verdict["unexplained_structure"]
             result["added"] = [r["added"] for r in rounds if r["added"] != "none"]
             for r in rounds:
@@ -167,10 +168,8 @@ def clean_cases(options):
 
 
 def count(names):
-    counted = {}
-    for name in names:
-        counted[name or "nothing"] = counted.get(name or "nothing", 0) + 1
-    return "; ".join("%s (%d)" % item for item in sorted(counted.items()))
+    return "; ".join("%s (%d)" % item
+                     for item in sorted(Counter(name or "nothing" for name in names).items()))
 
 
 def ratio_of(rows):
@@ -211,37 +210,37 @@ def write_effects(out, options, results):
 
 
 def write_pairs(out, options, results):
-    out.write("`--pairs %d --duration %g`: pairs at random, one run "
-              "each. Size: of the smaller one.\n\n| Effects | Motion | Added | Both | "
+    out.write("`--pairs %d --duration %g`: pairs at random of the effects that have parameters, "
+              "one run each. Size: of the smaller one; a delay_step that was not found has no time "
+              "to fit it at, and no size.\n\n| Effects | Motion | Added | Both | "
               "Unexplained | Size | Errors |\n| --- | --- | --- | --- | --- | --- | --- |\n" %
               (options.pairs, options.duration))
-    both, identifiable, both_of_identifiable = 0, 0, 0
+    both, small = 0, 0
     for r in results:
         found = set(r["effects"]) <= set(r["added"])
         both += found
-        if r["size"] is not None and r["size"] >= 3:
-            identifiable += 1
-            both_of_identifiable += found
+        small += r["size"] is not None and r["size"] < 3
         out.write("| %s | %s | %s | %s | %s | %s | %s |\n" % (
             r["name"], r["motion"], ", ".join(r["added"]) or r.get("failed") or "nothing",
             "yes" if found else "no", "yes" if r["unexplained"] else "no",
             "-" if r["size"] is None else "%.1f" % r["size"], ratio_of([r])))
-    out.write("\nBoth are found in %d of %d runs; where both have a size of 3 or more, in %d of "
-              "%d.\n\n" % (both, len(results), both_of_identifiable, identifiable))
+    out.write("\nBoth are found in %d of %d runs; in %d runs one has a size below 3.\n\n" %
+              (both, len(results), small))
 
 
 def write_clean(out, options, results):
     wrong = [r for r in results if r["added"] or r["unexplained"]]
-    failed = [r for r in results if "failed" in r]
-    out.write("`--clean %d --clean_duration %g`: walking, running, "
-              "handheld, slow, panning and rotation in turn; 0.2, 0.5 and 1 px; no, 5 and 15 %% "
-              "wrong observations; moving points, dropped frames, dropped samples, changing "
-              "exposure. In %d of %d recordings an effect is named or structure reported; %d could "
-              "not be calibrated.\n\n" % (options.clean, options.clean_duration, len(wrong),
-                                         len(results), len(failed)))
+    failed = [r for r in results if not r["tested"]]
+    out.write("`--clean %d --clean_duration %g`: walking, running, handheld, slow, panning and "
+              "rotation in turn; 0.2, 0.5 and 1 px; no, 5 and 15 %% wrong observations; moving "
+              "points, dropped frames, dropped samples, changing exposure. In %d of %d recordings "
+              "an effect is named or structure reported; %d could not be tested, and say nothing."
+              "\n\n" % (options.clean, options.clean_duration, len(wrong), len(results),
+                        len(failed)))
     for r in wrong + failed:
         out.write("- %s, seed %d (%s): %s%s\n" % (
-            r["motion"], r["seed"], r["variant"], ", ".join(r["added"]) or r.get("failed", ""),
+            r["motion"], r["seed"], r["variant"],
+            ", ".join(r["added"]) or r.get("failed", "" if r["tested"] else "not tested"),
             " unexplained structure" if r["unexplained"] else ""))
     if wrong or failed:
         out.write("\n")

@@ -107,9 +107,9 @@ TEST(FindEffects, NamesTheGyrosFilterWhenWalking) {
 // The frames that choose have half of the data: the gain scatters by 70 % of itself, where both
 // shares together leave no doubt.
 TEST(FindEffects, NamesALensThatIsNotCentred) {
-  const Diagnosis diagnosis =
-      Find(Simulate(2, {"motion.kind=running", "duration_s=20",
-                        "effects.tangential_distortion={p1: 0.002, p2: -0.003}"}));
+  const Diagnosis diagnosis = Find(Simulate(
+      1, {"motion.kind=running", "duration_s=40", "tracks.count=100", "tracks.noise_px=0.7",
+          "effects.tangential_distortion={p1: 0.002, p2: -0.003}"}));
   ASSERT_THAT(diagnosis.effects, testing::ElementsAre("tangential_distortion"));
   EXPECT_FALSE(diagnosis.unexplained_structure);
 }

@@ -59,8 +59,8 @@ TEST(CalibrateRecording, FindsTheTruthFromAPoorGuess) {
   EXPECT_FALSE(report->trace.empty());
 }
 
-// A lens that moves follows the rates at the time of exposure, which the delay of the start has 4
-// ms wrong: the effect is made anew with the fit.
+// A lens that moves follows the rates at the time of exposure. With the effect as the delay of the
+// start makes it, t_d ends some 3 ms (28 sigmas) off: it is made anew with the fit.
 TEST(CalibrateRecording, MakesEffectsAnewThatDependOnTheDelay) {
   Scenario scenario = ShortScenario(12.0);
   scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
