@@ -46,8 +46,7 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
         continue;
       }
       const double sigmas = ResidualOf(view, plane, i).value;
-      const double share = CoplanarityPlane::RowShare(view.measurement, row.match);
-      const Eigen::Vector3d tau = plane.tau + share * plane.turn;
+      const Eigen::Vector3d tau = plane.DirectionOf(view.measurement, i);
       row.residual_px = sigmas * noise_px;
       row.inlier = std::abs(sigmas) <= options.inlier_sigmas();
       // tau . (a x b) = (tau x a) . b moves with px_b, in units of its noise, as this gradient

@@ -39,7 +39,7 @@ CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
   CHECK_GT(pair_->sigma_px, 0.0);
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   set_num_residuals(static_cast<int>(pair_->matches.size()));
-  *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3, 3};
+  *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3, 6};
   if (pair_->effects) mutable_parameter_block_sizes()->push_back(pair_->effects->size());
   for (size_t g = 0; g < pair_->rate_group_sizes.size(); ++g) {
     mutable_parameter_block_sizes()->push_back(3 * pair_->num_rate_values(g));
@@ -55,14 +55,14 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
   const BearingsOfMatch bearings(pair, chain, parameters[0], parameters[1], parameters[2],
                                  pair.effects ? parameters[kEffectsBlock] : nullptr);
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
-  const Eigen::Vector3d turn = Eigen::Map<const Eigen::Vector3d>(parameters[kTurnBlock]);
+  const Eigen::Map<const Eigen::Matrix<double, 3, 2>> bend(parameters[kBendBlock]);
   PairRow row(chain.size());
   Bearing a, b;
   for (size_t i = 0; i < pair.matches.size(); ++i) {
     if (!bearings.Evaluate(i, jacobians != nullptr, &a, &b)) return false;
-    const double share = RowShare(pair, pair.matches[i]);
+    const Eigen::Vector2d shares = BendShares(pair, pair.matches[i]);
     const PlaneResidual r =
-        EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau + share * turn,
+        EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau + bend * shares,
                               pair.variance_a(), pair.variance_b());
     const RobustResidual robust = Robustify(r.value, pair.robust_threshold);
     residuals[i] = robust.value;
@@ -75,9 +75,9 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
     if (jacobians[kTauBlock] != nullptr) {
       Eigen::Map<Eigen::Vector3d>(jacobians[kTauBlock] + 3 * i) = robust.derivative * r.by_tau;
     }
-    if (jacobians[kTurnBlock] != nullptr) {
-      Eigen::Map<Eigen::Vector3d>(jacobians[kTurnBlock] + 3 * i) =
-          robust.derivative * share * r.by_tau;
+    if (jacobians[kBendBlock] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, 3, 2>>(jacobians[kBendBlock] + 6 * i) =
+          robust.derivative * r.by_tau * shares.transpose();
     }
   }
   return true;

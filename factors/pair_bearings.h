@@ -20,6 +20,7 @@ struct PairMeasurement {
   double sigma_px = 1.0;  // > 0, per axis of a noisy observation
   MatchNoise noise = MatchNoise::kBothImages;
   double robust_threshold = 0.0;  // in sigmas; 0: no loss
+  double readout_over_gap = 0.0;  // t_r over the time between the frames, of CoplanarityPlane
   const Lens* lens = nullptr;
   std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
 
@@ -41,7 +42,7 @@ struct PairMeasurement {
 };
 
 // Order of the parameter blocks of the coplanarity factors:
-//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>), turn 3,]
+//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>), bend 6,]
 //   [effects, if the pair has any,] rate groups, 3 * num_rate_values each
 // q_gyro_cam is stored [x y z w].
 inline int NumEffectBlocks(const PairMeasurement& pair) { return pair.effects ? 1 : 0; }

@@ -76,10 +76,10 @@ Eigen::MatrixXd RateColumnsOf(const AllEffects& all, const std::vector<double>& 
 struct PairSystem {
   Eigen::VectorXd r;
   Eigen::MatrixXd J, N;
-  Eigen::VectorXd prior;   // of N's columns, 1 / sigma^2, around zero
-  Eigen::VectorXd at;      // where they are
-  int turn_column = -1;    // of N; -1: none
-  double free_turn = 0.0;  // 1 / sigma^2 of a turn that is free
+  Eigen::VectorXd prior;  // of N's columns, 1 / sigma^2, around zero
+  Eigen::VectorXd at;     // where they are
+  int bend_column = -1;   // of N; -1: none
+  BendVector free_bend;   // 1 / sigma^2 of a bend that is free
 };
 
 void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore* block) {
@@ -104,13 +104,13 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   block->chi2 += pair->chi2;
   block->residuals += pair->residuals;
   ++block->pairs;
-  if (s.turn_column < 0) return;
+  if (s.bend_column < 0) return;
 
-  // Likelihood of two widths of the turn, all else of the pair projected out: with u the turn's
+  // Likelihood of two widths of the bend, all else of the pair projected out: with u the bend's
   // score and W its information, 2 log L(s) = u (W + s^-2)^-1 u - log det(1 + s^2 W).
-  const Eigen::Index at = s.turn_column, n = s.N.cols();
+  const Eigen::Index at = s.bend_column, n = s.N.cols();
   Eigen::VectorXd wide = s.prior;
-  wide.segment<3>(at).setConstant(s.free_turn);
+  wide.segment<6>(at) = s.free_bend;
   const auto two_log = [&](const Eigen::VectorXd& prior) {
     Eigen::MatrixXd B = s.N.transpose() * s.N;
     B.diagonal() += prior;
@@ -120,7 +120,7 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
     for (Eigen::Index i = 0; i < n; ++i) log_det += std::log(factor.vectorD()[i]);
     const Eigen::VectorXd b = s.N.transpose() * s.r + prior.cwiseProduct(s.at);
     return b.dot(factor.solve(b)) - s.at.dot(prior.cwiseProduct(s.at)) - log_det +
-           prior.segment<3>(at).array().log().sum();
+           prior.segment<6>(at).array().log().sum();
   };
   pair->turn_gain = two_log(wide) - two_log(s.prior);
 }
@@ -140,7 +140,7 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
   const ShutterParameters shutter(c.delay_s, c.readout_s);
   std::vector<const double*> parameters = {c.lens.data(), shutter.data(),
                                            c.q_gyro_cam.coeffs().data(), plane.tau.data(),
-                                           plane.turn.data()};
+                                           plane.bend.data()};
   if (measurement->effects) parameters.push_back(all.values.data());
   parameters.push_back(view.rates.data());
   const Evaluated e = Evaluate(cost, parameters);
@@ -170,27 +170,28 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
   const Eigen::Index step =
       std::max<Eigen::Index>(1, std::lround(options.rate_step_s / interval_s));
   const Eigen::Index values = (samples + step - 1) / step;
-  s->N.setZero(e.r.size(), 5 + 3 * values);
+  s->N.setZero(e.r.size(), 8 + 3 * values);
   s->N.col(0) = e.J[CoplanarityPlane::kTauBlock] * u;
   s->N.col(1) = e.J[CoplanarityPlane::kTauBlock] * v;
-  s->N.middleCols<3>(2) = e.J[CoplanarityPlane::kTurnBlock];
+  s->N.middleCols<6>(2) = e.J[CoplanarityPlane::kBendBlock];
   Eigen::VectorXd rate_prior(3 * values);
   for (Eigen::Index k = 0; k < values; ++k) {
     const Eigen::Index count = std::min(step, samples - k * step);
     for (Eigen::Index i = k * step; i < k * step + count; ++i) {
-      s->N.middleCols<3>(5 + 3 * k) += by_rates.middleCols<3>(3 * i);
+      s->N.middleCols<3>(8 + 3 * k) += by_rates.middleCols<3>(3 * i);
     }
     rate_prior.segment<3>(3 * k) =
         static_cast<double>(count) * options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse();
   }
   s->prior.setZero(s->N.cols());
-  s->prior.segment<3>(2).setConstant(1.0 / (view.turn_sigma_rad * view.turn_sigma_rad));
-  const double free_turn = TurnSigma(kFreeTurnRadS, c.readout_s);
-  s->free_turn = 1.0 / (free_turn * free_turn);
+  s->prior.segment<6>(2) = view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
+  s->free_bend = BendSigma(kFreeTurnRadS, c.readout_s, pair.time_b_s - pair.time_a_s)
+                     .cwiseAbs2()
+                     .cwiseInverse();
   s->prior.tail(3 * values) = rate_prior;
   s->at = Eigen::VectorXd::Zero(s->N.cols());
-  s->at.segment<3>(2) = plane.turn;
-  s->turn_column = 2;
+  s->at.segment<6>(2) = plane.bend;
+  s->bend_column = 2;
   return true;
 }
 
@@ -229,7 +230,7 @@ bool RotationSystem(const EstimationInput& input, const TimedPair& pair, const C
   s->N = by_rates;
   s->prior = options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse().replicate(rates.cols(), 1);
   s->at = Eigen::VectorXd::Zero(s->N.cols());
-  s->turn_column = -1;
+  s->bend_column = -1;
   return true;
 }
 
@@ -258,7 +259,7 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
       score.frame_b = pair.frame_b;
       score.time_s = pair.time_b_s;
       score.block = static_cast<int>(scores.blocks.size());
-      // The direction takes two; the turn none, since chi2 has the penalty of its prior.
+      // The direction takes two; the bend none, since chi2 has the penalty of its prior.
       score.residuals = static_cast<int>(system.r.size()) - (rotation ? 0 : 2);
       ProjectInto(system, scores.num_model, &score, &sum);
       scores.pairs.push_back(std::move(score));

@@ -108,7 +108,7 @@ std::vector<BlockId> BlocksOf(const std::vector<const Factor*>& factors) {
   return {used.begin(), used.end()};
 }
 
-// The unknowns of some factors in the order of elimination: turns, directions, rates from the last
+// The unknowns of some factors in the order of elimination: bends, directions, rates from the last
 // to the first, and what all share.
 struct Unknowns {
   Unknowns(const std::map<BlockId, Block>& blocks, const std::vector<const Factor*>& factors) {

@@ -15,7 +15,7 @@
 namespace camgyro {
 
 // What a block is. The solver eliminates from the last kind and index to the first.
-enum class BlockKind { kLens, kShutter, kRotation, kEffects, kBias, kRates, kDirection, kTurn };
+enum class BlockKind { kLens, kShutter, kRotation, kEffects, kBias, kRates, kDirection, kBend };
 
 struct BlockId {
   BlockKind kind = BlockKind::kLens;

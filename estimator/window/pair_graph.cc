@@ -28,7 +28,7 @@ const BlockId kEffectsBlock{BlockKind::kEffects, 0};
 BlockId BiasBlock(int64_t index) { return {BlockKind::kBias, index}; }
 BlockId RatesBlock(int64_t index) { return {BlockKind::kRates, index}; }
 BlockId DirectionBlock(int64_t index) { return {BlockKind::kDirection, index}; }
-BlockId TurnBlock(int64_t index) { return {BlockKind::kTurn, index}; }
+BlockId BendBlock(int64_t index) { return {BlockKind::kBend, index}; }
 
 // A gap of the gyro: longer than several sampling intervals.
 constexpr double kGapIntervals = 5.0;
@@ -297,14 +297,17 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   if (options_.residual == ResidualKind::kPlane) {
     graph_.AddBlock(DirectionBlock(id), {Geometry::kDirection, Eigen::Vector3d::UnitZ(), {}});
     blocks.push_back(DirectionBlock(id));
-    graph_.AddBlock(TurnBlock(id), {Geometry::kEuclidean, Eigen::Vector3d::Zero(), {}});
-    blocks.push_back(TurnBlock(id));
-    pair.turn_sigma_rad = TurnSigma(turn_sigma_rad_s_, graph_.value(kShutterBlock)[kReadout]);
-    graph_.AddFactor(
-        std::make_shared<MarginalPrior>(
-            std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(3), false}},
-            Eigen::MatrixXd::Identity(3, 3) / pair.turn_sigma_rad, Eigen::VectorXd::Zero(3)),
-        {TurnBlock(id)});
+    graph_.AddBlock(BendBlock(id), {Geometry::kEuclidean, BendVector::Zero(), {}});
+    blocks.push_back(BendBlock(id));
+    const double readout_s = graph_.value(kShutterBlock)[kReadout];
+    const double gap_s = frame_b.stamp_s - frame_a.stamp_s;
+    m.readout_over_gap = readout_s / gap_s;
+    pair.bend_sigma_rad = BendSigma(turn_sigma_rad_s_, readout_s, gap_s);
+    const BendVector inv_sigma = pair.bend_sigma_rad.cwiseInverse();
+    graph_.AddFactor(std::make_shared<MarginalPrior>(
+                         std::vector<MarginalPrior::Block>{{BendVector::Zero(), false}},
+                         inv_sigma.asDiagonal(), BendVector::Zero()),
+                     {BendBlock(id)});
   }
   if (num_effects_ > 0) blocks.push_back(kEffectsBlock);
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
@@ -383,7 +386,7 @@ void PairGraph::MarginalizeOldest() {
   std::vector<BlockId> leaving;
   if (graph_.Has(DirectionBlock(oldest->first))) {
     leaving.push_back(DirectionBlock(oldest->first));
-    leaving.push_back(TurnBlock(oldest->first));
+    leaving.push_back(BendBlock(oldest->first));
   }
   for (auto it = groups_.begin(); it != groups_.end() && still_needed.count(it->first) == 0;) {
     leaving.push_back(RatesBlock(it->first));
@@ -453,13 +456,13 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   if (options_.residual != ResidualKind::kPlane) {
     return FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold).residuals;
   }
-  const Eigen::Vector3d tau = graph_.value(DirectionBlock(id)), turn = graph_.value(TurnBlock(id));
+  const PairPlane plane{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
   double cost = 0.0;
   for (size_t i = 0; i < m.matches.size(); ++i) {
-    const double share = CoplanarityPlane::RowShare(m, m.matches[i]);
     residuals.push_back(EvaluatePlaneResidual(bearings_.a[i].ray_ref, bearings_.a[i].J_ray_px,
                                               bearings_.b[i].ray_ref, bearings_.b[i].J_ray_px,
-                                              tau + share * turn, m.variance_a(), m.variance_b())
+                                              plane.DirectionOf(m, i), m.variance_a(),
+                                              m.variance_b())
                             .value);
     const double robust = Robustify(residuals.back(), m.robust_threshold).value;
     cost += robust * robust;
@@ -467,10 +470,11 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   if (search) {
     const DirectionEstimate found =
         FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold);
-    cost += CostOfPointsBehind(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold, tau);
+    cost += CostOfPointsBehind(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold,
+                               plane.tau);
     if (found.cost < cost) {
       graph_.value(DirectionBlock(id)) = found.tau;
-      graph_.value(TurnBlock(id)).setZero();
+      graph_.value(BendBlock(id)).setZero();
       return found.residuals;
     }
   }
@@ -486,17 +490,18 @@ CrossFit PairGraph::CrossFitOf(int64_t id) {
   PairView view;
   view.measurement = *pair.measurement;
   view.bearings = bearings_;
-  view.turn_sigma_rad = pair.turn_sigma_rad;
+  view.bend_sigma_rad = pair.bend_sigma_rad;
   const auto bounded_sq = [&](double r) {
     return std::pow(Robustify(r, options_.robust_threshold).value, 2);
   };
   for (const double r : own) fit.own += bounded_sq(r);
   const auto n = static_cast<double>(own.size());
-  const double lost = CountsOf(options_.residual).lost_per_pair;
-  fit.own *= n / (n - lost);
-  fit.expected = fit.own * (1.0 + lost / (0.5 * n));
+  const PairPlane whole{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+  fit.own *= n / (n - DegreesOfFreedom(view, whole));
+  fit.expected = fit.own;
   for (const size_t half : {0, 1}) {
     const PairPlane plane = FitPlane(view, half, 2);
+    fit.expected += fit.own / n * DegreesOfFreedom(view, plane, half, 2);
     for (size_t i = 1 - half; i < own.size(); i += 2) {
       fit.unseen += bounded_sq(ResidualOf(view, plane, i).value);
     }

@@ -15,6 +15,7 @@
 #include "core/calibration.h"
 #include "core/recording.h"
 #include "estimator/window/factor_graph.h"
+#include "factors/coplanarity_plane.h"
 #include "factors/pair_bearings.h"
 #include "factors/relative_rotation.h"
 
@@ -68,9 +69,9 @@ struct TimedRate {
 // little takes more of the variance than its degrees of freedom, and where it takes noise for a
 // direction, the information that is left is too large by as much.
 struct CrossFit {
-  double own = 0.0;       // under the pair's direction and turn, corrected for degrees of freedom
+  double own = 0.0;       // under the pair's direction and bend, corrected for degrees of freedom
   double expected = 0.0;  // of the next, where every direction is well determined
-  double unseen = 0.0;    // each half of the matches under direction and turn of the other half
+  double unseen = 0.0;    // each half of the matches under direction and bend of the other half
 
   CrossFit& operator+=(const CrossFit& other) {
     own += other.own;
@@ -159,7 +160,7 @@ class PairGraph {
     std::vector<int64_t> groups;
     FactorGraph::FactorKey factor = 0;
     double time_s = 0.0;
-    double turn_sigma_rad = 0.0;  // prior
+    BendVector bend_sigma_rad;  // prior
   };
 
   // Null without effects that have parameters.

@@ -44,16 +44,26 @@ bool RatesOfPair(const EstimationInput& input, const TimedPair& pair,
   return true;
 }
 
-double TurnSigma(double turn_sigma_rad_s, double readout_s) {
-  return std::max(1e-4, turn_sigma_rad_s * std::abs(readout_s));
+BendVector BendSigma(double turn_sigma_rad_s, double readout_s, double gap_s) {
+  // A turn that comes and goes with steps of 2.7 Hz.
+  constexpr double kStepRadS = 17.0;
+  const double turn = turn_sigma_rad_s * std::abs(readout_s);
+  BendVector sigma;
+  sigma << Eigen::Vector3d::Constant(turn),
+      Eigen::Vector3d::Constant(turn * kStepRadS * gap_s / 12.0);
+  return sigma.cwiseMax(1e-4);
+}
+
+Eigen::Vector3d PairPlane::DirectionOf(const PairMeasurement& pair, size_t i) const {
+  const Eigen::Vector2d shares = CoplanarityPlane::BendShares(pair, pair.matches[i]);
+  return tau + shares[0] * bend.head<3>() + shares[1] * bend.tail<3>();
 }
 
 PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i) {
   const PairMeasurement& m = view.measurement;
   const Bearing &a = view.bearings.a[i], &b = view.bearings.b[i];
-  const double share = CoplanarityPlane::RowShare(m, m.matches[i]);
   return EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
-                               plane.tau + share * plane.turn, m.variance_a(), m.variance_b());
+                               plane.DirectionOf(m, i), m.variance_a(), m.variance_b());
 }
 
 std::vector<double> TransferResiduals(const PairView& view, const Calibration& calibration) {
@@ -67,6 +77,48 @@ std::vector<double> TransferResiduals(const PairView& view, const Calibration& c
   return residuals;
 }
 
+namespace {
+
+// Normal equations of some matches, about a plane: two coordinates of the direction, then the bend.
+struct PlaneEquations {
+  using Matrix8d = Eigen::Matrix<double, 8, 8>;
+
+  PlaneEquations(const PairView& view, const PairPlane& plane, size_t first, size_t step) {
+    const PairMeasurement& m = view.measurement;
+    basis.col(0) = plane.tau.unitOrthogonal();
+    basis.col(1) = plane.tau.cross(basis.col(0));
+    prior.tail<6>() = view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
+    g.tail<6>() = prior.tail<6>().cwiseProduct(plane.bend);
+    cost = plane.bend.dot(g.tail<6>());
+    for (size_t i = first; i < m.matches.size(); i += step) {
+      const PlaneResidual r = ResidualOf(view, plane, i);
+      const RobustResidual robust = Robustify(r.value, m.robust_threshold);
+      const Eigen::Vector2d shares = CoplanarityPlane::BendShares(m, m.matches[i]);
+      Vector8d J;
+      J.head<2>() = robust.derivative * (basis.transpose() * r.by_tau);
+      J.segment<3>(2) = robust.derivative * shares[0] * r.by_tau;
+      J.tail<3>() = robust.derivative * shares[1] * r.by_tau;
+      data += J * J.transpose();
+      g += J * robust.value;
+      cost += robust.value * robust.value;
+    }
+  }
+  Matrix8d WithPrior() const {
+    Matrix8d H = data;
+    H.diagonal() += prior;
+    H.diagonal().array() += 1e-9;  // a direction that nothing determines
+    return H;
+  }
+
+  using Vector8d = Eigen::Matrix<double, 8, 1>;
+  Eigen::Matrix<double, 3, 2> basis;
+  Matrix8d data = Matrix8d::Zero();
+  Vector8d prior = Vector8d::Zero(), g = Vector8d::Zero();
+  double cost = 0.0;
+};
+
+}  // namespace
+
 PairPlane FitPlane(const PairView& view, size_t first, size_t step) {
   const PairMeasurement& m = view.measurement;
   PairBearings some;
@@ -76,43 +128,26 @@ PairPlane FitPlane(const PairView& view, size_t first, size_t step) {
   }
   PairPlane plane;
   plane.tau = FindDirection(some, m.variance_a(), m.variance_b(), m.robust_threshold).tau;
-  // A turn is close to linear: a few steps of Gauss-Newton on
-  // two coordinates of the direction and three of the turn.
-  using Vector5d = Eigen::Matrix<double, 5, 1>;
-  const double prior = 1.0 / (view.turn_sigma_rad * view.turn_sigma_rad);
+  // A bend is close to linear: a few steps of Gauss-Newton.
   double cost = std::numeric_limits<double>::infinity();
   PairPlane next = plane;
   for (int iteration = 0; iteration < 6; ++iteration) {
-    Eigen::Matrix<double, 3, 2> basis;
-    basis.col(0) = next.tau.unitOrthogonal();
-    basis.col(1) = next.tau.cross(basis.col(0));
-    Eigen::Matrix<double, 5, 5> H = Eigen::Matrix<double, 5, 5>::Zero();
-    Vector5d g = Vector5d::Zero();
-    H.diagonal().tail<3>().setConstant(prior);
-    g.tail<3>() = prior * next.turn;
-    double next_cost = prior * next.turn.squaredNorm();
-    for (size_t i = first; i < m.matches.size(); i += step) {
-      const PlaneResidual r = ResidualOf(view, next, i);
-      const RobustResidual robust = Robustify(r.value, m.robust_threshold);
-      const double share = CoplanarityPlane::RowShare(m, m.matches[i]);
-      Vector5d J;
-      J.head<2>() = robust.derivative * (basis.transpose() * r.by_tau);
-      J.tail<3>() = robust.derivative * share * r.by_tau;
-      H += J * J.transpose();
-      g += J * robust.value;
-      next_cost += robust.value * robust.value;
-    }
-    if (!(next_cost < cost)) break;
-    const bool converged = next_cost > (1.0 - 1e-4) * cost;
-    cost = next_cost;
+    const PlaneEquations equations(view, next, first, step);
+    if (!(equations.cost < cost)) break;
+    const bool converged = equations.cost > (1.0 - 1e-4) * cost;
+    cost = equations.cost;
     plane = next;
     if (converged) break;
-    H.diagonal().head<2>().array() += 1e-12;
-    const Vector5d change = H.ldlt().solve(g);
-    next.tau = (plane.tau - basis * change.head<2>()).normalized();
-    next.turn = plane.turn - change.tail<3>();
+    const PlaneEquations::Vector8d change = equations.WithPrior().ldlt().solve(equations.g);
+    next.tau = (plane.tau - equations.basis * change.head<2>()).normalized();
+    next.bend = plane.bend - change.tail<6>();
   }
   return plane;
+}
+
+double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t first, size_t step) {
+  const PlaneEquations equations(view, plane, first, step);
+  return equations.WithPrior().ldlt().solve(equations.data).trace();
 }
 
 bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
@@ -128,10 +163,12 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
   m.robust_threshold = options.robust_threshold;
   m.lens = &GetLens(calibration.distortion_model);
   m.matches.clear();
-  view->turn_sigma_rad =
-      TurnSigma(std::max(options.turn_sigma_rad_s,
+  const double gap_s = m.frame_b.stamp_s - m.frame_a.stamp_s;
+  m.readout_over_gap = calibration.readout_s / gap_s;
+  view->bend_sigma_rad =
+      BendSigma(std::max(options.turn_sigma_rad_s,
                          calibration.effects ? calibration.effects->turn_sigma_rad_s() : 0.0),
-                calibration.readout_s);
+                calibration.readout_s, gap_s);
   m.effects = calibration.pair_effects().set != nullptr ? calibration.effects : nullptr;
   const RotationChain chain(m.rate_times_s, view->rates);
   const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);

@@ -16,16 +16,19 @@ struct PairView {
   PairMeasurement measurement;  // those matches that have a residual; rates in one group
   Eigen::Matrix3Xd rates;       // readings less bias and effects [rad/s]
   PairBearings bearings;        // with derivatives
-  double turn_sigma_rad = 0.0;  // prior of the turn
+  BendVector bend_sigma_rad;    // prior
 };
 
-// Spread of the change of direction over the rows, given that of its change in time.
-double TurnSigma(double turn_sigma_rad_s, double readout_s);
+// Standard deviations of the prior of a pair's bend, given that of its direction's change in time.
+BendVector BendSigma(double turn_sigma_rad_s, double readout_s, double gap_s);
 
-// The translation direction of a pair and its turn; see CoplanarityPlane.
+// The translation direction of a pair's matches; see CoplanarityPlane.
 struct PairPlane {
   Eigen::Vector3d tau = Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  BendVector bend = BendVector::Zero();
+
+  // Of match i.
+  Eigen::Vector3d DirectionOf(const PairMeasurement& pair, size_t i) const;
 };
 
 // False where the gyro's samples do not cover the pair. noise: pixels. Shutter, lens, effects and
@@ -35,8 +38,12 @@ struct PairPlane {
                             const PairGraphOptions& options, PairView* view);
 
 // The plane that fits the matches first, first + step, ... of a view best: the direction searched,
-// the turn with its prior.
+// its bend with the prior.
 PairPlane FitPlane(const PairView& view, size_t first = 0, size_t step = 1);
+// That a plane takes from these matches: 2 of a direction with a bend that its prior determines, at
+// most 6, since what of the bend lies along the direction changes nothing.
+double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t first = 0,
+                        size_t step = 1);
 // Of match i, in sigmas, without loss.
 PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i);
 

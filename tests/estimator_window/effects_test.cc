@@ -36,9 +36,9 @@ double Rms(const EstimationInput& input, const Calibration& calibration) {
   for (size_t i = 0; i < input.pairs.size(); i += 7) {
     EXPECT_TRUE(ViewPair(input, input.pairs[i], calibration, 0.05, options, &view));
     const DirectionEstimate found = FindDirection(view.bearings, 0.0025, 0.0025, 0.0);
-    // The turn: one linear step.
+    // The bend: one linear step.
     const PairMeasurement& m = view.measurement;
-    Eigen::MatrixXd J(m.matches.size(), 6);
+    Eigen::MatrixXd J(m.matches.size(), 9);
     Eigen::VectorXd r(m.matches.size());
     for (size_t k = 0; k < m.matches.size(); ++k) {
       const Bearing &a = view.bearings.a[k], &b = view.bearings.b[k];
@@ -46,8 +46,9 @@ double Rms(const EstimationInput& input, const Calibration& calibration) {
                                                            b.J_ray_px, found.tau, 0.0025, 0.0025);
       const auto row = static_cast<Eigen::Index>(k);
       r[row] = residual.value;
-      J.row(row) << residual.by_tau.transpose(),
-          CoplanarityPlane::RowShare(m, m.matches[k]) * residual.by_tau.transpose();
+      const Eigen::Vector2d shares = CoplanarityPlane::BendShares(m, m.matches[k]);
+      J.row(row) << residual.by_tau.transpose(), shares[0] * residual.by_tau.transpose(),
+          shares[1] * residual.by_tau.transpose();
     }
     r -= J * J.completeOrthogonalDecomposition().solve(r);
     sum_sq += 0.0025 * r.squaredNorm();

@@ -173,8 +173,8 @@ TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
   EXPECT_EQ(residuals_of(3), -1);  // fewer than 8 left
 }
 
-// Directions that the parallax determines take their four degrees of freedom; the best of many that
-// all say nothing takes more, which widens the sigmas.
+// Directions that the parallax determines take the degrees of freedom that are counted; the best of
+// many that all say nothing takes more, which widens the sigmas.
 TEST(PairGraph, DirectionsWithoutParallaxWidenTheSigmas) {
   const auto inflation_of = [](Scenario scenario) {
     scenario.tracks.count = 100;
@@ -195,7 +195,9 @@ TEST(PairGraph, DirectionsWithoutParallaxWidenTheSigmas) {
       graph.Residuals(pair.id, /*search=*/true);
       sum += graph.CrossFitOf(pair.id);
     }
-    EXPECT_NEAR(sum.expected / sum.own, 1.08, 0.02);  // 4 of some 50 in a half
+    // Two to six of some 50 in a half.
+    EXPECT_GT(sum.expected / sum.own, 1.035);
+    EXPECT_LT(sum.expected / sum.own, 1.13);
     return sum.inflation();
   };
   Scenario near = ShortScenario(4.0);

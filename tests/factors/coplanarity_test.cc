@@ -11,7 +11,7 @@
 namespace camgyro {
 namespace {
 
-using Jet = ceres::Jet<double, 68>;  // 8 + 2 + 4 + 3 + 3 + 48 parameters of the scene
+using Jet = ceres::Jet<double, 71>;  // 8 + 2 + 4 + 3 + 6 + 48 parameters of the scene
 
 std::vector<double> Residuals(const ceres::CostFunction& factor,
                               const std::vector<double*>& parameters) {
@@ -26,7 +26,7 @@ std::vector<Jet> SceneJets(const PairScene& s) {
   values.insert(values.end(), s.shutter.data(), s.shutter.data() + 2);
   values.insert(values.end(), s.q_gyro_cam.coeffs().data(), s.q_gyro_cam.coeffs().data() + 4);
   values.insert(values.end(), s.tau.data(), s.tau.data() + 3);
-  values.insert(values.end(), s.turn.data(), s.turn.data() + 3);
+  values.insert(values.end(), s.bend.data(), s.bend.data() + 6);
   for (const auto& group : s.rate_groups) {
     values.insert(values.end(), group.data(), group.data() + group.size());
   }
@@ -58,7 +58,7 @@ void ExpectMatchesReference(const ceres::CostFunction& factor, PairScene* s, boo
     int offset = 0;
     for (size_t block = 0; block < sizes.size(); ++block) {
       const int size = sizes[block];
-      if (!with_tau && block == CoplanarityPlane::kTauBlock) offset += 6;  // tau and turn
+      if (!with_tau && block == CoplanarityPlane::kTauBlock) offset += 9;  // tau and bend
       const Eigen::VectorXd want = expected.v.segment(offset, size);
       const Eigen::VectorXd have =
           Eigen::Map<const Eigen::VectorXd>(jacobians[block] + static_cast<int>(row) * size, size);
@@ -126,9 +126,37 @@ TEST(CoplanarityPlane, DoesNotDependOnTheSignOfTau) {
   Disturb(4, &s);
   const auto r = Residuals(CoplanarityPlane(s.pair), s.Parameters());
   s.tau = -s.tau;
-  s.turn = -s.turn;
+  s.bend = -s.bend;
   const auto r_flipped = Residuals(CoplanarityPlane(s.pair), s.Parameters());
   for (size_t i = 0; i < r.size(); ++i) EXPECT_NEAR(r[i], -r_flipped[i], 1e-12);
+}
+
+// On a path of constant jerk the direction of every match is known: that of the class comment.
+TEST(CoplanarityPlane, DirectionFollowsAPathWithJerk) {
+  const Eigen::Vector3d acceleration(3.0, -8.0, 5.0), jerk(-150.0, 100.0, 200.0);  // m/s^2, m/s^3
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    // Delay, gap and readout of the scene; the middle row is exposed half a readout later.
+    const double gap_s = 1.0 / 30, readout_s = 0.025, middle_s = 0.006 + 0.5 * (gap_s + readout_s);
+    PairScene s = MakePairScene(seed, 12, [&](double t) {
+      const double u = t - middle_s;
+      return Eigen::Vector3d(u * u / 2.0 * acceleration + u * u * u / 6.0 * jerk);
+    });
+    ASSERT_EQ(s.shutter, ShutterParameters(0.006, readout_s));
+    s.pair->readout_over_gap = readout_s / gap_s;
+    const Eigen::Vector3d path = s.tau + gap_s * gap_s / 24.0 * jerk;  // velocity 1 m/s along tau
+    s.tau = path.normalized();
+    s.bend << acceleration * readout_s, jerk * (readout_s * gap_s / 12.0);
+    s.bend /= path.norm();
+    double without_jerk = 0.0;
+    for (const double r : Residuals(CoplanarityPlane(s.pair), s.Parameters())) {
+      EXPECT_LT(std::abs(r), 1e-8) << seed;
+    }
+    s.bend.tail<3>().setZero();
+    for (const double r : Residuals(CoplanarityPlane(s.pair), s.Parameters())) {
+      without_jerk = std::max(without_jerk, std::abs(r));
+    }
+    EXPECT_GT(without_jerk, 1e-2) << seed;
+  }
 }
 
 TEST(CoplanarityPlane, JacobianMatchesAutodiffOfThePlainFormula) {
@@ -141,7 +169,7 @@ TEST(CoplanarityPlane, JacobianMatchesAutodiffOfThePlainFormula) {
         CoplanarityPlane(s.pair), &s, true, [&](size_t row, const std::vector<Jet>& x) {
           return reference::Plane<Jet>(*s.pair, s.pair->matches[row], x.data(), x.data() + 8,
                                        x.data() + 10, {x[14], x[15], x[16]}, {x[17], x[18], x[19]},
-                                       {x.begin() + 20, x.end()});
+                                       {x[20], x[21], x[22]}, {x.begin() + 23, x.end()});
         });
   }
 }
@@ -211,7 +239,7 @@ TEST(CoplanarityDeterminant, JacobianMatchesAutodiffOfThePlainFormula) {
                              }
                              return reference::Determinant<Jet>(*s.pair, matches, x.data(),
                                                                 x.data() + 8, x.data() + 10,
-                                                                {x.begin() + 20, x.end()});
+                                                                {x.begin() + 23, x.end()});
                            });
   }
 }

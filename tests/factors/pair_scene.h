@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <functional>
 #include <memory>
 #include <random>
 
@@ -18,7 +19,7 @@ struct PairScene {
   ShutterParameters shutter;
   Eigen::Quaterniond q_gyro_cam;
   Eigen::Vector3d tau;  // unit, in the reference (gyro frame at the first rate)
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 6, 1> bend = Eigen::Matrix<double, 6, 1>::Zero();
   std::vector<Eigen::Matrix3Xd> rate_groups;
 
   // Parameter pointers in the order of CoplanarityPlane, or without tau.
@@ -26,16 +27,21 @@ struct PairScene {
     std::vector<double*> p = {lens.data(), shutter.data(), q_gyro_cam.coeffs().data()};
     if (with_tau) {
       p.push_back(tau.data());
-      p.push_back(turn.data());
+      p.push_back(bend.data());
     }
     for (auto& group : rate_groups) p.push_back(group.data());
     return p;
   }
 };
 
-// Camera that turns with random rates and moves along tau at 1 m/s past points at 1.5-20 m.
+// Camera that turns with random rates and moves along tau at 1 m/s past points at 1.5-20 m, on a
+// straight path but for the detour (of the time from the first exposure, in the reference) [m].
 // Every parameter is non-zero, so that each term of the derivatives counts. Matches are exact.
-inline PairScene MakePairScene(uint64_t seed, int num_matches = 12) {
+inline PairScene MakePairScene(
+    uint64_t seed, int num_matches = 12,
+    const std::function<Eigen::Vector3d(double)>& detour = [](double) {
+      return Eigen::Vector3d(Eigen::Vector3d::Zero());
+    }) {
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
@@ -52,6 +58,7 @@ inline PairScene MakePairScene(uint64_t seed, int num_matches = 12) {
   s.pair->frame_b.stamp_s = 1.0 + 1.0 / 30;
   s.pair->size_px << 752.0, 480.0;
   s.pair->sigma_px = 0.5;
+  s.pair->readout_over_gap = 0.75;
   s.pair->lens = &GetLens(DistortionModel::kRadTan);
   s.pair->rate_group_sizes = {6, 7, 3};
   Eigen::Matrix3Xd rates(3, 16);
@@ -73,8 +80,8 @@ inline PairScene MakePairScene(uint64_t seed, int num_matches = 12) {
     for (int i = 0; i < 30; ++i) {  // the row decides the time, the time decides the row
       const double t = stamp_s + s.shutter[kDelay] + s.shutter[kReadout] * v / 480.0;
       const Eigen::Matrix3d R_ref_cam = chain.At(t).R_ref_gyro * s.q_gyro_cam.toRotationMatrix();
-      const auto projected =
-          s.pair->lens->Project(R_ref_cam.transpose() * (point_ref - (t - 1.0) * s.tau), s.lens);
+      const auto projected = s.pair->lens->Project(
+          R_ref_cam.transpose() * (point_ref - (t - 1.0) * s.tau - detour(t - 1.0)), s.lens);
       if (!projected) return std::optional<Eigen::Vector2d>();
       px = *projected;
       v = px.y();
@@ -109,7 +116,7 @@ inline void Disturb(uint64_t seed, PairScene* s) {
   s->q_gyro_cam = s->q_gyro_cam * Exp(Eigen::Vector3d(0.02, -0.03, 0.01));
   s->tau = (s->tau + 0.1 * Eigen::Vector3d(normal(generator), normal(generator), normal(generator)))
                .normalized();
-  s->turn << 0.2, -0.1, 0.15;
+  s->bend << 0.2, -0.1, 0.15, -0.05, 0.1, 0.03;
   for (Match& match : s->pair->matches) {
     match.px_a += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));
     match.px_b += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));

@@ -98,10 +98,17 @@ void RayAndJacobian(const PairMeasurement& pair, const T* lens, const T* shutter
 // Residual of one match against tau, unrobust. parameters as in CoplanarityPlane.
 template <typename T>
 T Plane(const PairMeasurement& pair, const Match& match, const T* lens, const T* shutter,
-        const T* q, const Vec3<T>& tau0, const Vec3<T>& turn, const std::vector<T>& rates) {
+        const T* q, const Vec3<T>& tau0, const Vec3<T>& turn, const Vec3<T>& bow,
+        const std::vector<T>& rates) {
   using std::sqrt;
-  const T middle_row((match.px_a.y() + match.px_b.y()) / 2);
-  const Vec3<T> tau = tau0 + turn * (middle_row / T(pair.size_px.y()) - T(0.5));
+  const double height = pair.size_px.y();
+  const double from = match.px_a.y() / height - 0.5, to = match.px_b.y() / height - 0.5;
+  const double rho = pair.readout_over_gap;
+  // (u^2 + u u' + u'^2) / 6 of u = -T / 2 + t_r from, u' = T / 2 + t_r to, in units of T t_r / 12,
+  // less what does not depend on the rows
+  const double u = -0.5 + rho * from, u2 = 0.5 + rho * to;
+  const double c = ((u * u + u * u2 + u2 * u2) / 6.0 - 1.0 / 24.0) * 12.0 / rho;
+  const Vec3<T> tau = tau0 + turn * T((from + to) / 2.0) + bow * T(c);
   Vec3<T> a, b;
   Mat32<T> A, B;
   RayAndJacobian(pair, lens, shutter, q, rates, match.px_a, pair.frame_a.stamp_s, &a, &A);
