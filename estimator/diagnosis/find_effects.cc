@@ -284,7 +284,7 @@ class Loop {
     for (auto& [r, candidate] : all) {
       if (r.p_value * tests > options_.significance) {
         r.rejected = "not significant";
-      } else if (!IsSure(r.gain, r.inflation, r.p_value * tests)) {
+      } else if (!IsSure(r, tests)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
     }
@@ -305,12 +305,17 @@ class Loop {
   // effect acts in some blocks only (a step early in the recording) so that the scatter is the
   // effect itself, beyond twice the noise that the gain of a right effect has, 2 sqrt(gain),
   // inflated as the test; a right effect then makes hardly any block worse. Where both shares
-  // together leave no doubt (p_value, corrected for the number of candidates), the half of the data
-  // that tells the gain only has to agree.
-  static bool IsSure(const Gain& gain, double inflation, double p_value) {
-    const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, inflation));
-    const double sigmas = p_value < kOverwhelming ? 1.0 : 2.0;
-    return gain.sum > sigmas * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum);
+  // together leave no doubt, the half of the data that tells the gain only has to agree: with its
+  // sign, and with half of the statistic, which is what a right effect gains there.
+  static bool IsSure(const CandidateResult& r, double tests) {
+    const Gain& gain = r.gain;
+    const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, r.inflation));
+    if (gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum)) {
+      return true;
+    }
+    const double expected = 0.5 * r.statistic * r.inflation;
+    return r.p_value * tests < kOverwhelming && gain.sum > 0.0 &&
+           gain.sum + 2.0 * gain.sigma > expected;
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -452,8 +457,7 @@ class Loop {
           r.rejected = p.name + " outside of what real devices show";
         }
       }
-      if (r.rejected.empty() &&
-          !IsSure(r.gain, r.inflation, r.p_value * static_cast<double>(all->size()))) {
+      if (r.rejected.empty() && !IsSure(r, static_cast<double>(all->size()))) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
       if (r.rejected.empty() &&

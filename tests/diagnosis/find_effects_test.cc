@@ -103,7 +103,6 @@ TEST(FindEffects, NamesTheGyrosFilterWhenWalking) {
   EXPECT_NEAR(found.estimate[0], 0.008 * 0.008, 4.0 * found.sigma[0]);
 }
 
-// Not in the catalogue: every fifth stamp is 8 ms late.
 // The frames that choose have half of the data: the gain scatters by 70 % of itself, where both
 // shares together leave no doubt.
 TEST(FindEffects, NamesALensThatIsNotCentred) {
@@ -114,6 +113,7 @@ TEST(FindEffects, NamesALensThatIsNotCentred) {
   EXPECT_FALSE(diagnosis.unexplained_structure);
 }
 
+// Not in the catalogue: every fifth stamp is 8 ms late.
 TEST(FindEffects, LeavesAPeriodicGlitchWithoutAName) {
   Recording recording = Simulate(6, {});
   for (size_t i = 0; i < recording.frames.size(); i += 5) recording.frames[i].stamp_ns += 8'000'000;
