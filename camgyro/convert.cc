@@ -50,7 +50,13 @@ api::Calibration ToApi(const Calibration& calibration) {
   c.focal_px = lens[kFocal];
   c.aspect_ratio = lens[kAspect];
   c.principal_px = {lens[kCx], lens[kCy]};
-  c.distortion = {lens[kK1], lens[kK2], lens[kP1], lens[kP2]};
+  const DistortionCoefficients distortion =
+      StandardDistortion(calibration.distortion_model, lens,
+                         Eigen::Vector2d(calibration.width_px, calibration.height_px));
+  if (distortion.model == DistortionModel::kKannalaBrandt) {
+    c.distortion_model = api::Distortion::kKannalaBrandt;
+  }
+  std::copy(distortion.k.data(), distortion.k.data() + 4, c.distortion.begin());
   c.readout_s = calibration.readout_s;
   c.delay_s = calibration.delay_s;
   c.bias_gyro_rad_s = ToApi(calibration.bias_gyro_rad_s);
@@ -128,7 +134,10 @@ Result<CameraGuess> FromApi(const api::CameraGuess& guess) {
     if (!(std::abs(k) < 10.0)) return BadUsage("camera: expected distortion between -10 and 10");
     if (k != 0.0) camera.distortion_model = DistortionModel::kRadTan;
   }
-  if (camera.distortion_model == DistortionModel::kRadTan) {
+  if (guess.distortion_model == api::Distortion::kKannalaBrandt) {
+    camera.distortion_model = DistortionModel::kKannalaBrandt;
+  }
+  if (camera.distortion_model != DistortionModel::kNone) {
     camera.distortion.assign(guess.distortion.begin(), guess.distortion.end());
   }
   for (const auto& [value, limit, name] :

@@ -65,12 +65,18 @@ enum Parameter : int {
 };
 CAMGYRO_API const char* ParameterName(int parameter) noexcept;  // "focal_px", ...
 
+enum class Distortion {
+  kRadTan,         // k1, k2, p1, p2 as in OpenCV
+  kKannalaBrandt,  // k1, k2, k3, k4 as OpenCV's fisheye, Kalibr's "equidistant"
+};
+
 struct Calibration {
   int width_px = 0, height_px = 0;
   double focal_px = 0.0;      // fy
   double aspect_ratio = 1.0;  // fx / fy
   std::array<double, 2> principal_px{};
-  // Radial-tangential k1, k2, p1, p2 as in OpenCV; all zero: none. Given, not estimated.
+  // Given, not estimated; all zero with kRadTan: none.
+  Distortion distortion_model = Distortion::kRadTan;
   std::array<double, 4> distortion{};
   double readout_s = 0.0;
   double delay_s = 0.0;
@@ -85,6 +91,7 @@ struct CameraGuess {
   std::optional<double> focal_px;
   double aspect_ratio = 1.0;
   std::optional<std::array<double, 2>> principal_px;
+  Distortion distortion_model = Distortion::kRadTan;
   std::array<double, 4> distortion{};
   std::optional<double> readout_s;
   std::optional<double> delay_s;  // centre of the search

@@ -1,6 +1,6 @@
 #include "core/lens.h"
 
-#include <Eigen/LU>
+#include <Eigen/Dense>
 #include <cmath>
 
 namespace camgyro {
@@ -8,48 +8,86 @@ namespace {
 
 using Matrix32 = Eigen::Matrix<double, 3, 2>;
 
+// A function of t = r^2 with two derivatives.
+struct Radial {
+  double value = 0.0, slope = 0.0, curvature = 0.0;
+};
+
+// c = theta / r = atan(r) / r.
+Radial AngleOverRadius(double t) {
+  Radial c;
+  if (t < 0.02) {  // sum of (-t)^j / (2j + 1), to 1e-16
+    double power = 1.0;
+    for (int j = 0; j < 11; ++j) {
+      c.value += power / (2 * j + 1);
+      c.slope -= (j + 1) * power / (2 * j + 3);
+      c.curvature += (j + 1) * (j + 2) * power / (2 * j + 5);
+      power *= -t;
+    }
+    return c;
+  }
+  c.value = std::atan(std::sqrt(t)) / std::sqrt(t);
+  c.slope = (1.0 / (1.0 + t) - c.value) / (2.0 * t);
+  c.curvature = (-1.0 / ((1.0 + t) * (1.0 + t)) - 3.0 * c.slope) / (2.0 * t);
+  return c;
+}
+
+// theta^(2k+1) / r = c^(2k+1) t^k for k = 1..4: the factors of kb1..kb4.
+std::array<Radial, 4> AngleSeries(const Radial& c, double t) {
+  std::array<Radial, 4> series;
+  for (int k = 1; k <= 4; ++k) {
+    const int n = 2 * k + 1;
+    const double p2 = std::pow(c.value, n - 2), p1 = p2 * c.value, p0 = p1 * c.value;
+    const double t2 = k > 1 ? std::pow(t, k - 2) : 0.0, t1 = k > 1 ? t2 * t : 1.0, t0 = t1 * t;
+    const double p_slope = n * p1 * c.slope;
+    Radial& m = series[static_cast<size_t>(k - 1)];
+    m.value = p0 * t0;
+    m.slope = p_slope * t0 + k * p0 * t1;
+    m.curvature = (n * (n - 1) * p2 * c.slope * c.slope + n * p1 * c.curvature) * t0 +
+                  2.0 * k * p_slope * t1 + k * (k - 1) * p0 * t2;
+  }
+  return series;
+}
+
+// Derivative of (x, y) m(r^2) by (x, y).
+Eigen::Matrix2d RadialJacobian(double x, double y, const Radial& m) {
+  Eigen::Matrix2d J;
+  J(0, 0) = m.value + 2.0 * x * x * m.slope;
+  J(0, 1) = J(1, 0) = 2.0 * x * y * m.slope;
+  J(1, 1) = m.value + 2.0 * y * y * m.slope;
+  return J;
+}
+
 struct Distortion {
   Eigen::Vector2d value;  // distorted normalised coordinates
   Eigen::Matrix2d J;      // by the undistorted ones
+  Radial radial;
 };
 
-Distortion DistortRadTan(const Eigen::Vector2d& xy, const LensParameters& lens) {
-  const double k1 = lens[kK1], k2 = lens[kK2], p1 = lens[kP1], p2 = lens[kP2];
-  const double x = xy.x(), y = xy.y(), r2 = xy.squaredNorm();
-  const double radial = 1.0 + (k1 + k2 * r2) * r2;
-  const double slope = k1 + 2.0 * k2 * r2;  // d radial / d r2
-  Distortion d;
-  d.value << x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-      y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-  d.J(0, 0) = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
-  d.J(0, 1) = d.J(1, 0) = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
-  d.J(1, 1) = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
-  return d;
-}
-
-// Pinhole with radial-tangential distortion. Unprojection inverts the distortion by Newton's
-// method; derivatives of the inverse follow from the implicit function theorem.
-class PinholeRadTan final : public Lens {
+// The lens block of core/lens.h: by Newton's method from the pixel to the ray; derivatives of the
+// inverse follow from the implicit function theorem.
+class AxialLens final : public Lens {
  public:
+  // equidistant: kKannalaBrandt.
+  explicit AxialLens(bool equidistant) : equidistant_(equidistant) {}
+
   bool Unproject(const Eigen::Vector2d& px, const LensParameters& lens, RayJet* out,
-                 bool derivatives_by_lens) const override {
+                 LensDerivatives by_lens) const override {
     const double f = lens[kFocal], aspect = lens[kAspect];
     const double fx = f * aspect;
     const Eigen::Vector2d distorted((px.x() - lens[kCx]) / fx, (px.y() - lens[kCy]) / f);
     Eigen::Vector2d xy = distorted;
-    Distortion d = DistortRadTan(xy, lens);
-    const bool has_distortion = !lens.segment<4>(kK1).isZero(0.0);
+    Distortion d = Distort(xy, lens);
+    const bool has_distortion = equidistant_ || !lens.tail<kLensSize - kK1>().isZero(0.0);
     if (has_distortion) {
       for (int i = 0; i < 20; ++i) {
         const Eigen::Vector2d error = distorted - d.value;
         if (error.squaredNorm() < 1e-26) break;
-        if (!(d.J.determinant() > 0.05)) return false;  // beyond the fold of the distortion
+        if (!IsInvertible(d, xy)) return false;
         xy += d.J.inverse() * error;
-        d = DistortRadTan(xy, lens);
+        d = Distort(xy, lens);
       }
-      if (!((distorted - d.value).squaredNorm() < 1e-20) || !(d.J.determinant() > 0.05)) {
-        return false;
-      }
+      if (!((distorted - d.value).squaredNorm() < 1e-20) || !IsInvertible(d, xy)) return false;
     }
     if (!xy.allFinite()) return false;
 
@@ -57,10 +95,12 @@ class PinholeRadTan final : public Lens {
     out->ray << x, y, 1.0;
     out->J_ray_px.topRows<2>() = d.J.inverse() * Eigen::Vector2d(1.0 / fx, 1.0 / f).asDiagonal();
     out->J_ray_px.row(2).setZero();
-    if (!derivatives_by_lens) return true;
+    out->num_lens = by_lens == LensDerivatives::kAll ? kLensSize : kAspect;
+    if (by_lens == LensDerivatives::kNone) out->num_lens = 0;
+    if (out->num_lens == 0) return true;
 
-    const double k1 = lens[kK1], k2 = lens[kK2], p1 = lens[kP1], p2 = lens[kP2];
-    const double slope = k1 + 2.0 * k2 * r2, curvature = 2.0 * k2;
+    const double p1 = lens[kP1], p2 = lens[kP2];
+    const double slope = d.radial.slope, curvature = d.radial.curvature;
     const Eigen::Matrix2d J_inv = d.J.inverse();
     Eigen::Matrix2d scale = Eigen::Matrix2d::Zero();  // d distorted / d px
     scale(0, 0) = 1.0 / fx;
@@ -85,22 +125,28 @@ class PinholeRadTan final : public Lens {
     distorted_by(1, kCy) = -1.0 / f;
     distorted_by(0, kAspect) = -distorted.x() / aspect;
     Eigen::Matrix<double, 2, kLensSize> value_by = Eigen::Matrix<double, 2, kLensSize>::Zero();
-    value_by.col(kK1) = xy * r2;
-    value_by.col(kK2) = xy * r2 * r2;
-    value_by.col(kP1) << 2.0 * x * y, r2 + 2.0 * y * y;
-    value_by.col(kP2) << r2 + 2.0 * x * x, 2.0 * x * y;
+    std::array<Radial, 4> series;
+    if (by_lens == LensDerivatives::kAll) {
+      series = AngleSeries(AngleOverRadius(r2), r2);
+      value_by.col(kK1) = xy * r2;
+      value_by.col(kK2) = xy * r2 * r2;
+      value_by.col(kP1) << 2.0 * x * y, r2 + 2.0 * y * y;
+      value_by.col(kP2) << r2 + 2.0 * x * x, 2.0 * x * y;
+      for (int k = 0; k < 4; ++k) {
+        value_by.col(kKb1 + k) = xy * series[static_cast<size_t>(k)].value;
+      }
+    }
 
     out->J_ray_lens.row(2).setZero();
-    for (int k = 0; k < kLensSize; ++k) {
+    for (int k = 0; k < out->num_lens; ++k) {
       const Eigen::Vector2d xy_k = J_inv * (distorted_by.col(k) - value_by.col(k));
       out->J_ray_lens.col(k).head<2>() = xy_k;
       Eigen::Matrix2d J_k = J_x * xy_k.x() + J_y * xy_k.y();
-      if (k == kK1) J_k += symmetric(r2 + 2.0 * x * x, 2.0 * x * y, r2 + 2.0 * y * y);
-      if (k == kK2) {
-        J_k += r2 * symmetric(r2 + 4.0 * x * x, 4.0 * x * y, r2 + 4.0 * y * y);
-      }
+      if (k == kK1) J_k += RadialJacobian(x, y, {r2, 1.0, 0.0});
+      if (k == kK2) J_k += RadialJacobian(x, y, {r2 * r2, 2.0 * r2, 2.0});
       if (k == kP1) J_k += symmetric(2.0 * y, 2.0 * x, 6.0 * y);
       if (k == kP2) J_k += symmetric(6.0 * x, 2.0 * y, 2.0 * x);
+      if (k >= kKb1) J_k += RadialJacobian(x, y, series[static_cast<size_t>(k - kKb1)]);
       Eigen::Matrix2d scale_k = Eigen::Matrix2d::Zero();
       if (k == kFocal) scale_k = -scale / f;
       if (k == kAspect) scale_k(0, 0) = -scale(0, 0) / aspect;
@@ -114,13 +160,52 @@ class PinholeRadTan final : public Lens {
                                          const LensParameters& lens) const override {
     if (!(point_cam.z() > 0.0)) return std::nullopt;
     const Eigen::Vector2d xy = point_cam.head<2>() / point_cam.z();
-    const Distortion d = DistortRadTan(xy, lens);
-    if (!(d.J.determinant() > 0.05)) return std::nullopt;
+    const Distortion d = Distort(xy, lens);
+    if (!IsInvertible(d, xy)) return std::nullopt;
     return Eigen::Vector2d(lens[kFocal] * lens[kAspect] * d.value.x() + lens[kCx],
                            lens[kFocal] * d.value.y() + lens[kCy]);
   }
 
-  std::array<const char*, 4> DistortionNames() const override { return {"k1", "k2", "p1", "p2"}; }
+ private:
+  Distortion Distort(const Eigen::Vector2d& xy, const LensParameters& lens) const {
+    const double k1 = lens[kK1], k2 = lens[kK2], p1 = lens[kP1], p2 = lens[kP2];
+    const double x = xy.x(), y = xy.y(), r2 = xy.squaredNorm();
+    Distortion d;
+    d.radial = {(k1 + k2 * r2) * r2, k1 + 2.0 * k2 * r2, 2.0 * k2};
+    if (equidistant_ || !lens.tail<4>().isZero(0.0)) {
+      const Radial c = AngleOverRadius(r2);
+      const std::array<Radial, 4> series = AngleSeries(c, r2);
+      for (int k = 0; k < 4; ++k) {
+        d.radial.value += lens[kKb1 + k] * series[static_cast<size_t>(k)].value;
+        d.radial.slope += lens[kKb1 + k] * series[static_cast<size_t>(k)].slope;
+        d.radial.curvature += lens[kKb1 + k] * series[static_cast<size_t>(k)].curvature;
+      }
+      if (equidistant_) {
+        d.radial.value += c.value;
+        d.radial.slope += c.slope;
+        d.radial.curvature += c.curvature;
+      }
+    }
+    if (!equidistant_) d.radial.value += 1.0;
+    d.value << x * d.radial.value + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+        y * d.radial.value + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
+    d.J = RadialJacobian(x, y, d.radial);
+    d.J(0, 0) += 2.0 * p1 * y + 6.0 * p2 * x;
+    d.J(0, 1) += 2.0 * p1 * x + 2.0 * p2 * y;
+    d.J(1, 0) += 2.0 * p1 * x + 2.0 * p2 * y;
+    d.J(1, 1) += 6.0 * p1 * y + 2.0 * p2 * x;
+    return d;
+  }
+
+  // Not beyond the fold of the distortion. A wide lens squeezes more than a fold does, so there it
+  // is against the squeeze of theta alone: 1 / (1 + r^2) along the radius, theta / r across.
+  bool IsInvertible(const Distortion& d, const Eigen::Vector2d& xy) const {
+    const double r2 = xy.squaredNorm();
+    const double plain = equidistant_ ? AngleOverRadius(r2).value / (1.0 + r2) : 1.0;
+    return d.J.determinant() > 0.05 * plain;
+  }
+
+  const bool equidistant_;
 };
 
 }  // namespace
@@ -135,14 +220,74 @@ LensParameters MakePinhole(double focal_px, const Eigen::Vector2d& principal_px,
   return lens;
 }
 
-const Lens& GetLens(DistortionModel) {
+const Lens& GetLens(DistortionModel model) {
   // A pinhole is the radial-tangential lens with coefficients zero.
-  static const PinholeRadTan lens;
-  return lens;
+  static const AxialLens pinhole(false), equidistant(true);
+  return model == DistortionModel::kKannalaBrandt ? equidistant : pinhole;
 }
 
 std::string DistortionModelName(DistortionModel model) {
-  return model == DistortionModel::kRadTan ? "radtan" : "none";
+  switch (model) {
+    case DistortionModel::kRadTan:
+      return "radtan";
+    case DistortionModel::kKannalaBrandt:
+      return "kannala_brandt";
+    case DistortionModel::kNone:
+      break;
+  }
+  return "none";
+}
+
+void DistortionCoefficients::WriteTo(LensParameters* lens) const {
+  lens->tail<kLensSize - kK1>().setZero();
+  lens->segment<4>(FirstCoefficient(model)) = k;
+}
+
+DistortionCoefficients StandardDistortion(DistortionModel model, const LensParameters& lens,
+                                          const Eigen::Vector2d& size_px) {
+  DistortionCoefficients result;
+  result.by_lens.setZero();
+  if (model == DistortionModel::kKannalaBrandt || lens.tail<4>().isZero(0.0)) {
+    result.model = model;
+    if (model == DistortionModel::kNone && !lens.segment<4>(kK1).isZero(0.0)) {
+      result.model = DistortionModel::kRadTan;
+    }
+    const LensIndex first = FirstCoefficient(result.model);
+    result.k = lens.segment<4>(first);
+    result.by_lens.middleCols<4>(first).setIdentity();
+    return result;
+  }
+  // theta + sum k_i theta^(2i+1) = r (radial part), least squares over the angles of the picture.
+  result.model = DistortionModel::kKannalaBrandt;
+  LensParameters axial = lens;
+  axial[kP1] = axial[kP2] = 0.0;
+  double radius = 0.0;
+  for (const double u : {0.0, size_px.x()}) {
+    for (const double v : {0.0, size_px.y()}) {
+      RayJet ray;
+      if (GetLens(model).Unproject({u, v}, axial, &ray, LensDerivatives::kNone)) {
+        radius = std::max(radius, ray.ray.head<2>().norm());
+      }
+    }
+  }
+  constexpr int kAngles = 200;
+  const double widest = radius > 0.0 ? std::atan(radius) : 1.0;
+  Eigen::Matrix<double, kAngles, 4> A;
+  Eigen::Matrix<double, kAngles, kLensSize> by_lens =
+      Eigen::Matrix<double, kAngles, kLensSize>::Zero();
+  Eigen::Matrix<double, kAngles, 1> rest;  // what the coefficients do not change
+  for (int i = 0; i < kAngles; ++i) {
+    const double theta = widest * (i + 0.5) / kAngles, r = std::tan(theta);
+    for (int k = 0; k < 4; ++k) A(i, k) = std::pow(theta, 2 * k + 3);
+    by_lens.col(kK1)[i] = r * r * r;
+    by_lens.col(kK2)[i] = r * r * r * r * r;
+    by_lens.block<1, 4>(i, kKb1) = A.row(i);
+    rest[i] = r - theta;
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, kAngles, 4>> solver(A);
+  result.by_lens = solver.solve(by_lens);
+  result.k = solver.solve(rest + by_lens * axial);
+  return result;
 }
 
 }  // namespace camgyro

@@ -46,7 +46,7 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
                      const ShutterParameters& shutter, const Eigen::Matrix3d& R_gyro_cam,
                      const RotationChain& chain, const FrameTime& frame,
                      const Eigen::Vector2d& size_px, const Eigen::Vector2d& px,
-                     const PairEffects& effects, Bearing* b, bool derivatives) {
+                     const PairEffects& effects, Bearing* b, LensDerivatives by_lens) {
   const double height_px = size_px.y();
   b->row_fraction = px.y() / height_px;
   b->J_time_px << 0.0, shutter[kReadout] / height_px;
@@ -60,8 +60,8 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
     time_s += change[0];
     b->J_time_px += change.tail<2>().transpose();
   }
-  if (!lens_model.Unproject(px, lens_here, &b->lens_ray, derivatives)) return false;
-  if (b->change.lens_slope[0].cols() > 0 && derivatives) {
+  if (!lens_model.Unproject(px, lens_here, &b->lens_ray, by_lens)) return false;
+  if (b->change.lens_slope[0].cols() > 0 && by_lens == LensDerivatives::kAll) {
     const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
     for (int k = 0; k < 2; ++k) {
       b->lens_ray.J_ray_px.col(k) +=
@@ -98,9 +98,10 @@ void Backpropagate(const Bearing& b, const RotationChain& chain, double height_p
 
   // Lens: through the ray (which also enters the row-time part of J) and through J_ray_px.
   const Eigen::Vector3d by_lens_ray = by_ray_cam + by_J_time.cross(omega);
-  Eigen::Matrix<double, 1, kLensSize> by_lens = by_lens_ray.transpose() * b.lens_ray.J_ray_lens;
-  for (int k = 0; k < kLensSize; ++k) {
-    by_lens[k] += b.lens_ray.J_ray_px_lens[k].cwiseProduct(by_J_cam).sum();
+  Eigen::Matrix<double, 1, kLensSize> by_lens = Eigen::Matrix<double, 1, kLensSize>::Zero();
+  for (int k = 0; k < b.lens_ray.num_lens; ++k) {
+    by_lens[k] = by_lens_ray.dot(b.lens_ray.J_ray_lens.col(k)) +
+                 b.lens_ray.J_ray_px_lens[k].cwiseProduct(by_J_cam).sum();
   }
   gradient->by_lens += by_lens;
 

@@ -64,13 +64,14 @@ struct PairGradient {
 };
 
 // False where the lens has no ray for this pixel. size_px: width, height of the picture.
-// Backpropagate needs `derivatives`.
+// Backpropagate needs derivatives by the lens: those of the gradient.
 [[nodiscard]] bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
                                    const ShutterParameters& shutter,
                                    const Eigen::Matrix3d& R_gyro_cam, const RotationChain& chain,
                                    const FrameTime& frame, const Eigen::Vector2d& size_px,
                                    const Eigen::Vector2d& px, const PairEffects& effects,
-                                   Bearing* bearing, bool derivatives = true);
+                                   Bearing* bearing,
+                                   LensDerivatives by_lens = LensDerivatives::kAll);
 
 // The same without effects.
 [[nodiscard]] inline bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
@@ -78,9 +79,10 @@ struct PairGradient {
                                           const Eigen::Matrix3d& R_gyro_cam,
                                           const RotationChain& chain, double frame_time_s,
                                           double height_px, const Eigen::Vector2d& px,
-                                          Bearing* bearing, bool derivatives = true) {
+                                          Bearing* bearing,
+                                          LensDerivatives by_lens = LensDerivatives::kAll) {
   return EvaluateBearing(lens_model, lens, shutter, R_gyro_cam, chain, FrameTime{frame_time_s},
-                         Eigen::Vector2d(0.0, height_px), px, PairEffects(), bearing, derivatives);
+                         Eigen::Vector2d(0.0, height_px), px, PairEffects(), bearing, by_lens);
 }
 
 // Adds to `gradient` and `by_rates` (3 x chain.size()) the derivative of a scalar, given its

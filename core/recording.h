@@ -75,7 +75,12 @@ struct CameraGuess {
   double aspect_ratio = 1.0;       // fu / fv
   std::optional<Eigen::Vector2d> principal_px;
   DistortionModel distortion_model = DistortionModel::kNone;
-  std::vector<double> distortion;  // in the order of the model (lens.h)
+  std::vector<double> distortion;  // the model's four coefficients; empty: zero
+  void SetDistortion(DistortionModel model, const LensParameters& lens) {
+    const auto k = lens.segment<4>(FirstCoefficient(model));
+    distortion_model = model;
+    distortion.assign(k.data(), k.data() + 4);
+  }
   std::optional<Eigen::Quaterniond> q_gyro_cam;
   std::optional<double> readout_s;
   std::optional<double> delay_s;

@@ -153,7 +153,8 @@ Calibration MakePrior(const Recording& recording, const StartResult& start) {
                                       : 0.8 * std::max(guess.width_px, guess.height_px);
   prior.lens = MakePinhole(focal, guess.principal_px.value_or(centre), guess.aspect_ratio);
   for (size_t i = 0; i < guess.distortion.size() && i < 4; ++i) {
-    prior.lens[kK1 + static_cast<int>(i)] = guess.distortion[i];
+    prior.lens[FirstCoefficient(guess.distortion_model) + static_cast<int>(i)] =
+        guess.distortion[i];
   }
   const double interval = std::min(1.0 / 30.0, MedianInterval(recording.frames));
   prior.readout_s = guess.readout_s.value_or(0.5 * interval);

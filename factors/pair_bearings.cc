@@ -18,10 +18,11 @@ BearingsOfMatch::BearingsOfMatch(const PairMeasurement& pair, const RotationChai
 
 bool BearingsOfMatch::Evaluate(size_t match, bool derivatives, Bearing* a, Bearing* b) const {
   const Match& m = pair_.matches[match];
+  const LensDerivatives by_lens = derivatives ? pair_.by_lens : LensDerivatives::kNone;
   if (!EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, pair_.frame_a,
-                       pair_.size_px, m.px_a, effects_, a, derivatives) ||
+                       pair_.size_px, m.px_a, effects_, a, by_lens) ||
       !EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, pair_.frame_b,
-                       pair_.size_px, m.px_b, effects_, b, derivatives)) {
+                       pair_.size_px, m.px_b, effects_, b, by_lens)) {
     return false;
   }
   b->ScaleNoise(m.noise_factor_b);

@@ -22,6 +22,8 @@ struct PairMeasurement {
   double robust_threshold = 0.0;  // in sigmas; 0: no loss
   double readout_over_gap = 0.0;  // t_r over the time between the frames, of CoplanarityPlane
   const Lens* lens = nullptr;
+  // Jacobians by the other lens parameters are zero, for solves that hold them; with effects: all.
+  LensDerivatives by_lens = LensDerivatives::kAll;
   std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
 
   // Rates that the pair needs: their times, strictly increasing, split into consecutive groups of

@@ -42,7 +42,7 @@ std::vector<CameraRotation> CameraRotationsOf(const std::vector<FramePair>& pair
   LensParameters lens =
       MakePinhole(focal_px, camera.principal_px.value_or(centre), camera.aspect_ratio);
   for (size_t i = 0; i < std::min<size_t>(camera.distortion.size(), 4); ++i) {
-    lens[kK1 + static_cast<int>(i)] = camera.distortion[i];
+    lens[FirstCoefficient(camera.distortion_model) + static_cast<int>(i)] = camera.distortion[i];
   }
   const Lens& model = GetLens(camera.distortion_model);
   std::vector<CameraRotation> rotations;

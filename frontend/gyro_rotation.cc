@@ -60,7 +60,7 @@ Eigen::Vector2d GyroRotation::Predict(const Eigen::Vector2d& px_a) const {
   const ShutterParameters shutter = ShutterOf(calibration_);
   Bearing bearing;
   if (!EvaluateBearing(lens, calibration_.lens, shutter, R_gyro_cam_, chain_, 0.0,
-                       calibration_.height_px, px_a, &bearing, false)) {
+                       calibration_.height_px, px_a, &bearing, LensDerivatives::kNone)) {
     return no_idea;
   }
   Eigen::Vector2d px_b = px_a;
@@ -82,7 +82,7 @@ std::optional<RotatedMatch> GyroRotation::Rotate(const Match& match) const {
   Bearing a, b;
   const auto evaluate = [&](double frame_time_s, const Eigen::Vector2d& px, Bearing* bearing) {
     return EvaluateBearing(lens, calibration_.lens, shutter, R_gyro_cam_, chain_, frame_time_s,
-                           calibration_.height_px, px, bearing, false);
+                           calibration_.height_px, px, bearing, LensDerivatives::kNone);
   };
   if (!evaluate(0.0, match.px_a, &a) || !evaluate(interval_s_, match.px_b, &b)) return std::nullopt;
   return RotatedMatch{a.ray_ref, b.ray_ref, a.J_ray_px, b.J_ray_px};

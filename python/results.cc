@@ -99,6 +99,11 @@ Eigen::MatrixXd Rows(const VinsStart& start, int columns, Get get) {
   return rows;
 }
 
+DistortionCoefficients Standard(const Calibration& c) {
+  return StandardDistortion(c.distortion_model, c.FullLens(),
+                            Eigen::Vector2d(c.width_px, c.height_px));
+}
+
 void BindCalibration(py::module_* module) {
   py::class_<Calibration>(*module, "Calibration", "Values and their joint covariance.")
       .def_property_readonly_static(
@@ -116,9 +121,12 @@ void BindCalibration(py::module_* module) {
           [](const Calibration& c) { return Eigen::Vector2d(c.lens[kCx], c.lens[kCy]); },
           "float array (2,) [px]")
       .def_property_readonly(
-          "distortion",
-          [](const Calibration& c) { return Eigen::Vector4d(c.FullLens().segment<4>(kK1)); },
-          "float array (4,): k1, k2, p1, p2")
+          "distortion", [](const Calibration& c) { return Standard(c).k; },
+          "float array (4,): k1, k2, p1, p2 (radtan) or k1, k2, k3, k4 (kannala_brandt)")
+      .def_property_readonly(
+          "distortion_model",
+          [](const Calibration& c) { return DistortionModelName(Standard(c).model); },
+          "str: none, radtan or kannala_brandt")
       .def_readwrite("readout_s", &Calibration::readout_s, "first to last row [s]")
       .def_readwrite("delay_s", &Calibration::delay_s, "t_gyro = t_camera + delay_s [s]")
       .def_property(

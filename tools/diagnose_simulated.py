@@ -66,6 +66,11 @@ def changes_of(scenario):
             if not change.startswith(("duration_s", "tracks.", "motion."))]
 
 
+def effect_of(scenario):
+    """effect_NAME.yaml, or effect_NAME.VARIANT.yaml"""
+    return name_of(scenario).split(".")[0]
+
+
 def name_of(scenario):
     return os.path.basename(scenario)[:-5].replace("effect_", "")
 
@@ -131,14 +136,15 @@ def effect_cases(options):
     for scenario in sorted(glob.glob(SOURCE + "/tools/scenarios/effect_*.yaml")):
         for motion, seed in itertools.product(motions_of(options), range(1, options.seeds + 1)):
             yield dict(kind="effects", name=name_of(scenario), motion=motion, seed=seed,
-                       effects=[name_of(scenario)],
+                       effects=[effect_of(scenario)],
                        scenario=[scenario, "seed=%d" % seed, "duration_s=%g" % options.duration,
                                  "motion.kind=" + motion])
 
 
 def pair_cases(options):
     scenarios = [s for s in sorted(glob.glob(SOURCE + "/tools/scenarios/effect_*.yaml"))
-                 if name_of(s) not in NOT_FITTED + ("translation_acceleration",)]
+                 if name_of(s) not in NOT_FITTED + ("translation_acceleration",)
+                 and name_of(s) == effect_of(s)]
     pairs = list(itertools.combinations(scenarios, 2))
     random.Random(1).shuffle(pairs)
     for seed, (a, b) in enumerate(pairs[:options.pairs], 1):
@@ -192,7 +198,7 @@ def write_effects(out, options, results):
     right, identifiable, right_of_identifiable = 0, 0, 0
     for name, motion in keys:
         rows = [r for r in results if (r["name"], r["motion"]) == (name, motion)]
-        first = [r["added"][:1] == [name] for r in rows]
+        first = [r["added"][:1] == r["effects"] for r in rows]
         sizes = [r["size"] for r in rows if r["size"] is not None]
         size = np.median(sizes) if sizes else None
         right += sum(first)

@@ -142,8 +142,9 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
   for (size_t i = 1; i < round.candidates.size(); ++i) {
     const CandidateResult& rival = round.candidates[i];
     if (rival.refitted) {
-      rivals += Format("%s%s (chi2 %.0f ± %.0f)", rivals.empty() ? "" : ", ", rival.name.c_str(),
-                       rival.gain.sum, rival.gain.sigma);
+      const bool same = rival.name == c.name;
+      rivals += Format("%s%s (%schi2 %.0f ± %.0f)", rivals.empty() ? "" : ", ", rival.name.c_str(),
+                       same ? (rival.shape + ", ").c_str() : "", rival.gain.sum, rival.gain.sigma);
     }
   }
   if (!rivals.empty()) text += "     rivals, refitted: " + rivals + "\n";

@@ -107,13 +107,19 @@ void ParseLens(const Section& camera, Calibration* c) {
   const YAML::Node model = distortion.IsMap() ? distortion["model"] : distortion;
   const auto name = model && model.IsScalar() ? model.as<std::string>() : std::string();
   if (name == DistortionModelName(DistortionModel::kNone)) return;
-  if (name != DistortionModelName(DistortionModel::kRadTan)) {
-    camera.Fail(model, "distortion", "model: `" + name + "` is unknown, expected none or radtan");
+  for (const auto known : {DistortionModel::kRadTan, DistortionModel::kKannalaBrandt}) {
+    if (name == DistortionModelName(known)) c->distortion_model = known;
   }
-  c->distortion_model = DistortionModel::kRadTan;
+  if (c->distortion_model == DistortionModel::kNone) {
+    camera.Fail(model, "distortion",
+                "model: `" + name + "` is unknown, expected none, radtan or kannala_brandt");
+  }
   const std::vector<double> k = camera.Numbers("distortion", 4);
-  if (k.empty()) camera.Fail(distortion, "distortion", "expected value: [k1, k2, p1, p2]");
-  std::copy(k.begin(), k.end(), c->lens.data() + kK1);
+  if (k.empty()) {
+    camera.Fail(distortion, "distortion",
+                "expected value: [k1, k2, p1, p2] (radtan) or [k1, k2, k3, k4] (kannala_brandt)");
+  }
+  std::copy(k.begin(), k.end(), c->lens.data() + FirstCoefficient(c->distortion_model));
 }
 
 // Index of a parameter's name, or -1: parameters that Calibration does not hold may stand beside.

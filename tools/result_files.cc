@@ -36,12 +36,16 @@ void EmitVector(YAML::Emitter& out, const char* key, const Values& value, const 
 }
 
 // Standard deviations of the coordinates of the lens block that effects have changed; else zero.
-LensParameters FittedLensSigma(const Calibration& c) {
-  LensParameters sigma = LensParameters::Zero();
-  if (c.pair_effects().set == nullptr) return sigma;
-  const Eigen::VectorXd all = c.effect_covariance.diagonal().cwiseSqrt();
-  // One effect has one coordinate of the lens: the change by one sigma is the sigma.
-  return (c.effects->ConstantLens(sigma, all)).cwiseAbs();
+using LensCovariance = Eigen::Matrix<double, kLensSize, kLensSize>;
+
+LensCovariance FittedLensCovariance(const Calibration& c) {
+  if (c.pair_effects().set == nullptr) return LensCovariance::Zero();
+  Eigen::Matrix<double, kLensSize, Eigen::Dynamic> by_effects(kLensSize, c.effects->size());
+  for (int i = 0; i < c.effects->size(); ++i) {
+    by_effects.col(i) = c.effects->ConstantLens(LensParameters::Zero(),
+                                                Eigen::VectorXd::Unit(c.effects->size(), i));
+  }
+  return by_effects * c.effect_covariance * by_effects.transpose();
 }
 
 void BeginSection(YAML::Emitter& out, const char* key) {
@@ -56,19 +60,22 @@ void EmitCamera(YAML::Emitter& out, const Calibration& c) {
   EmitScalar(out, "focal_px", c.lens[kFocal], sigma[kStateFocal]);
   EmitVector(out, "principal_px", {c.lens[kCx], c.lens[kCy]}, "sigma", Segment(sigma, kStateCx, 2));
   // Distortion and aspect ratio with what effects have added to them.
-  const LensParameters lens = c.FullLens(), lens_sigma = FittedLensSigma(c);
-  EmitScalar(out, "aspect_ratio", lens[kAspect], lens_sigma[kAspect]);
+  const LensParameters lens = c.FullLens();
+  const LensCovariance covariance = FittedLensCovariance(c);
+  EmitScalar(out, "aspect_ratio", lens[kAspect], std::sqrt(covariance(kAspect, kAspect)));
+  const DistortionCoefficients distortion =
+      StandardDistortion(c.distortion_model, lens, Eigen::Vector2d(c.width_px, c.height_px));
   Values coefficients, coefficients_sigma;
-  const bool distorted = !lens.segment<4>(kK1).isZero(0.0);
-  if (c.distortion_model != DistortionModel::kNone || distorted) {
-    coefficients.assign(lens.data() + kK1, lens.data() + kLensSize);
-    coefficients_sigma.assign(lens_sigma.data() + kK1, lens_sigma.data() + kLensSize);
+  if (distortion.model != DistortionModel::kNone) {
+    const Eigen::Vector4d sigma_k =
+        (distortion.by_lens * covariance * distortion.by_lens.transpose()).diagonal().cwiseSqrt();
+    coefficients.assign(distortion.k.data(), distortion.k.data() + 4);
+    coefficients_sigma.assign(sigma_k.data(), sigma_k.data() + 4);
   }
-  const DistortionModel model = distorted ? DistortionModel::kRadTan : c.distortion_model;
   out << YAML::Key << "distortion" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
-      << "model" << YAML::Value << DistortionModelName(model) << YAML::Key << "value" << YAML::Value
-      << coefficients << YAML::Key << "sigma" << YAML::Value << coefficients_sigma << YAML::EndMap
-      << YAML::EndMap;
+      << "model" << YAML::Value << DistortionModelName(distortion.model) << YAML::Key << "value"
+      << YAML::Value << coefficients << YAML::Key << "sigma" << YAML::Value << coefficients_sigma
+      << YAML::EndMap << YAML::EndMap;
 }
 
 void EmitEffects(YAML::Emitter& out, const Calibration& c) {

@@ -91,7 +91,8 @@ struct EffectSetup {
   Eigen::Matrix3Xd gyro_rad_s;            // readings, one column per time
   double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
   Eigen::Matrix3d R_gyro_cam = Eigen::Matrix3d::Identity();
-  bool has_pixels = true;  // false: attitudes
+  bool has_pixels = true;                                     // false: attitudes
+  DistortionModel distortion_model = DistortionModel::kNone;  // declared
 
   // The frames' span on the gyro clock [s].
   double from_s() const { return frames.front().stamp_s + delay_s; }
@@ -104,8 +105,9 @@ struct EffectEntry {
   ModelPart part;
   std::string explanation;  // one sentence for people: what it is
   std::string advice;       // what to do about it
-  // Shapes that this recording can show, by name, those with fewest parameters first; empty where
-  // it has not what the effect needs. Effects without parameters of their own have none.
+  // Shapes that this recording can show, by name, the usual one last (it is taken where none is
+  // asked for); empty where it has not what the effect needs. Effects without parameters of their
+  // own have none.
   std::function<std::vector<std::string>(const EffectSetup&)> shapes;
   // The effect in a shape (also one with a number that shapes() does not list, where the entry's
   // file says so); null if there is no such shape here.

@@ -1,14 +1,15 @@
 // Straight lines are imaged bent, alike in all directions from the principal point.
+#include <algorithm>
+
 #include "core/effects/entries.h"
 #include "core/effects/shapes.h"
 
 namespace camgyro {
 namespace {
 
-class RadialDistortion final : public Effect {
+class RadTan final : public Effect {
  public:
-  explicit RadialDistortion(const EffectSetup&)
-      : Effect({{"k1", "", 0.3, -0.6, 0.4}, {"k2", "", 0.3, -1.0, 1.0}}) {}
+  RadTan() : Effect({{"k1", "", 0.3, -0.6, 0.4}, {"k2", "", 0.3, -1.0, 1.0}}) {}
   void ChangeLens(const Observation&, LensColumns columns) const override {
     columns(kK1, 0) = 1.0;
     columns(kK2, 1) = 1.0;
@@ -16,18 +17,46 @@ class RadialDistortion final : public Effect {
   bool is_constant_lens() const override { return true; }
 };
 
+// Of Kannala & Brandt's series: the difference from the declared lens, so for a pinhole that from
+// the series of tan. An equidistant fisheye lens without further distortion has some -1/3, -2/15.
+class KannalaBrandt final : public Effect {
+ public:
+  KannalaBrandt()
+      : Effect({{"kb1", "", 0.3, -0.8, 0.5},
+                {"kb2", "", 0.3, -1.5, 1.5},
+                {"kb3", "", 0.3, -2.0, 2.0},
+                {"kb4", "", 0.3, -2.0, 2.0}}) {}
+  void ChangeLens(const Observation&, LensColumns columns) const override {
+    for (int k = 0; k < 4; ++k) columns(kKb1 + k, k) = 1.0;
+  }
+  bool is_constant_lens() const override { return true; }
+};
+
+constexpr char kRadTanShape[] = "radtan", kKannalaBrandtShape[] = "kannala_brandt";
+
+std::vector<std::string> Shapes(const EffectSetup& setup) {
+  if (!setup.has_pixels) return {};
+  if (setup.distortion_model == DistortionModel::kKannalaBrandt) return {kKannalaBrandtShape};
+  return {kKannalaBrandtShape, kRadTanShape};
+}
+
+std::shared_ptr<const Effect> Make(const EffectSetup& setup, const std::string& shape) {
+  const std::vector<std::string> shapes = Shapes(setup);
+  if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) return nullptr;
+  if (shape == kRadTanShape) return std::make_shared<RadTan>();
+  return std::make_shared<KannalaBrandt>();
+}
+
 }  // namespace
 
 EffectEntry RadialDistortionEntry() {
-  return WithOneShape<RadialDistortion>(
-      {"radial_distortion",
-       ModelPart::kLens,
-       "the lens bends straight lines: the picture is stretched or squeezed towards its edge",
-       "declare the fitted distortion_coefficients in sensor.yaml, and use them wherever the "
-       "focal length is used",
-       {},
-       {}},
-      "radtan", NeedsPixels);
+  return {"radial_distortion",
+          ModelPart::kLens,
+          "the lens bends straight lines: the picture is stretched or squeezed towards its edge",
+          "declare the fitted distortion (camera: distortion: of calibration.yaml) in sensor.yaml, "
+          "and use it wherever the focal length is used",
+          Shapes,
+          Make};
 }
 
 }  // namespace camgyro

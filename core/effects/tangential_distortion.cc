@@ -27,7 +27,9 @@ EffectEntry TangentialDistortionEntry() {
        "declare the fitted p1, p2 in sensor.yaml's distortion_coefficients",
        {},
        {}},
-      "radtan", NeedsPixels);
+      "radtan", [](const EffectSetup& setup) {
+        return setup.has_pixels && setup.distortion_model != DistortionModel::kKannalaBrandt;
+      });
 }
 
 }  // namespace camgyro

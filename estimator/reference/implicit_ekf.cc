@@ -251,8 +251,8 @@ ImplicitEkf::UpdateResult ImplicitEkf::Update(double time_a_s, double time_b_s,
   RayJet ray;
   for (const Match& match : matches) {
     const Lens& model = GetLens(start_.distortion_model);
-    if (model.Unproject(match.px_a, LensOf(x_), &ray, false) &&
-        model.Unproject(match.px_b, LensOf(x_), &ray, false)) {
+    if (model.Unproject(match.px_a, LensOf(x_), &ray, LensDerivatives::kNone) &&
+        model.Unproject(match.px_b, LensOf(x_), &ray, LensDerivatives::kNone)) {
       pair.matches.push_back(match);
     }
   }

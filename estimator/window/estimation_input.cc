@@ -91,6 +91,7 @@ EstimationInput MakeEstimationInput(const Recording& recording, const PairSelect
 EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration) {
   EffectSetup setup;
   setup.size_px << recording.camera.width_px, recording.camera.height_px;
+  setup.distortion_model = calibration.distortion_model;
   setup.delay_s = calibration.delay_s;
   setup.readout_s = calibration.readout_s;
   setup.R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();

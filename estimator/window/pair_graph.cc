@@ -261,8 +261,8 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   m.lens = &GetLens(prior_mean_.distortion_model);
   RayJet ray;
   for (const Match& match : matches) {
-    if (m.lens->Unproject(match.px_a, lens, &ray, false) &&
-        m.lens->Unproject(match.px_b, lens, &ray, false)) {
+    if (m.lens->Unproject(match.px_a, lens, &ray, LensDerivatives::kNone) &&
+        m.lens->Unproject(match.px_b, lens, &ray, LensDerivatives::kNone)) {
       m.matches.push_back(match);
     }
   }
@@ -286,6 +286,7 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   m.frame_b = frame_b;
   m.size_px << prior_mean_.width_px, prior_mean_.height_px;
   m.effects = Effects();
+  if (m.effects == nullptr) m.by_lens = LensDerivatives::kPinhole;  // the others are held
   m.sigma_px = options_.sigma_px;
   m.noise = options_.match_noise;
   m.robust_threshold = options_.robust_threshold;

@@ -116,14 +116,25 @@ void ReadDistortion(Keys* keys, CameraGuess* camera) {
     if (values && !values->empty()) {
       keys->Fail("distortion_coefficients",
                  "are given, but distortion_model is missing or none; expected it to be "
-                 "radial-tangential (k1, k2, p1, p2)");
+                 "radial-tangential (k1, k2, p1, p2) or equidistant (k1, k2, k3, k4)");
     }
+    return;
+  }
+  if (model == "equidistant" || model == "kannala_brandt" || model == "kb4" || model == "fisheye") {
+    if (!values || values->size() != 4) {
+      keys->Fail(values ? "distortion_coefficients" : "distortion_model",
+                 "expected distortion_coefficients: [k1, k2, k3, k4] of Kannala & Brandt");
+      return;
+    }
+    camera->distortion_model = DistortionModel::kKannalaBrandt;
+    camera->distortion = *values;
     return;
   }
   if (model != "radial-tangential" && model != "radtan" && model != "plumb_bob") {
     keys->Fail("distortion_model", Concat("'", model,
-                                          "' is not supported, expected none, or radial-tangential "
-                                          "(= radtan = plumb_bob: k1, k2, p1, p2)"));
+                                          "' is not supported, expected none, radial-tangential "
+                                          "(= radtan = plumb_bob: k1, k2, p1, p2), or equidistant "
+                                          "(= kannala_brandt = kb4 = fisheye: k1, k2, k3, k4)"));
     return;
   }
   // plumb_bob has k3 behind the four; ours has not.

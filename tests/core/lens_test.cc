@@ -47,11 +47,14 @@ TEST(Lens, ProjectInvertsUnprojectOverTheWholePicture) {
   }
 }
 
-TEST(Lens, DerivativesMatchDifferences) {
-  const Lens& model = GetLens(DistortionModel::kRadTan);
-  LensParameters lens = EurocLens();
-  lens[kP1] = 0.004;  // large enough that a wrong tangential term would show
-  lens[kP2] = -0.003;
+// An equidistant lens of 66 deg half the diagonal.
+LensParameters FisheyeLens() {
+  LensParameters lens = MakePinhole(380.0, {374.0, 242.0}, 1.01);
+  lens.tail<4>() << 0.02, -0.01, 0.006, -0.002;
+  return lens;
+}
+
+void ExpectDerivativesOfDifferences(const Lens& model, const LensParameters& lens) {
   std::mt19937_64 generator(4);
   std::uniform_real_distribution<double> u(0, 752), v(0, 480);
   for (int trial = 0; trial < 20; ++trial) {
@@ -71,11 +74,51 @@ TEST(Lens, DerivativesMatchDifferences) {
       lens_minus[k] -= h;
       RayJet plus, minus;
       ASSERT_TRUE(model.Unproject(px, lens_plus, &plus) && model.Unproject(px, lens_minus, &minus));
-      EXPECT_LT(((plus.ray - minus.ray) / (2 * h) - jet.J_ray_lens.col(k)).norm(), 1e-7) << k;
-      EXPECT_LT(((plus.J_ray_px - minus.J_ray_px) / (2 * h) - jet.J_ray_px_lens[k]).norm(), 1e-7)
+      const double scale = 1.0 + jet.J_ray_lens.col(k).norm();
+      EXPECT_LT(((plus.ray - minus.ray) / (2 * h) - jet.J_ray_lens.col(k)).norm(), 1e-7 * scale)
+          << k;
+      EXPECT_LT(((plus.J_ray_px - minus.J_ray_px) / (2 * h) - jet.J_ray_px_lens[k]).norm(),
+                1e-7 * scale)
           << k;
     }
   }
+}
+
+TEST(Lens, DerivativesMatchDifferences) {
+  LensParameters lens = EurocLens();
+  lens[kP1] = 0.004;  // large enough that a wrong tangential term would show
+  lens[kP2] = -0.003;
+  ExpectDerivativesOfDifferences(GetLens(DistortionModel::kRadTan), lens);
+  lens.tail<4>() << -0.05, 0.03, 0.02, -0.01;
+  ExpectDerivativesOfDifferences(GetLens(DistortionModel::kRadTan), lens);
+  ExpectDerivativesOfDifferences(GetLens(DistortionModel::kKannalaBrandt), FisheyeLens());
+}
+
+// A pinhole with kb says the same as the Kannala-Brandt lens that is reported for it.
+TEST(Lens, StandardDistortionKeepsTheRays) {
+  LensParameters lens = MakePinhole(420.0, {375.5, 239.5});
+  lens.tail<4>() << -0.31, -0.1, -0.06, -0.02;  // nearly equidistant
+  lens[kK1] = 0.01;
+  const Eigen::Vector2d size_px(752.0, 480.0);
+  const DistortionCoefficients standard = StandardDistortion(DistortionModel::kNone, lens, size_px);
+  ASSERT_EQ(standard.model, DistortionModel::kKannalaBrandt);
+  LensParameters reported = lens;
+  standard.WriteTo(&reported);
+  for (double u = 0.0; u <= 752.0; u += 94.0) {
+    for (double v = 0.0; v <= 480.0; v += 96.0) {
+      RayJet ray;
+      ASSERT_TRUE(GetLens(DistortionModel::kNone).Unproject({u, v}, lens, &ray));
+      const auto px = GetLens(standard.model).Project(ray.ray, reported);
+      ASSERT_TRUE(px.has_value());
+      EXPECT_LT((*px - Eigen::Vector2d(u, v)).norm(), 0.1) << u << " " << v;  // at the corners
+    }
+  }
+  // Derivative, but for the picture's widest angle, which moves a little.
+  LensParameters moved = lens;
+  moved[kKb2] += 0.01;
+  const Eigen::Vector4d change =
+      StandardDistortion(DistortionModel::kNone, moved, size_px).k - standard.k;
+  EXPECT_LT((change - 0.01 * standard.by_lens.col(kKb2)).norm(), 0.5 * change.norm());
 }
 
 TEST(Lens, RefusesPixelsBeyondTheFoldOfTheDistortion) {

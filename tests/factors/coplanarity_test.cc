@@ -11,7 +11,8 @@
 namespace camgyro {
 namespace {
 
-using Jet = ceres::Jet<double, 71>;  // 8 + 2 + 4 + 3 + 6 + 48 parameters of the scene
+constexpr int kReferenceLensSize = kP2 + 1;
+using Jet = ceres::Jet<double, 71>;  // 8 + 2 + 4 + 3 + 6 + 48 parameters: the reference knows no kb
 
 std::vector<double> Residuals(const ceres::CostFunction& factor,
                               const std::vector<double*>& parameters) {
@@ -22,7 +23,7 @@ std::vector<double> Residuals(const ceres::CostFunction& factor,
 
 // All parameters of the scene as jets, in the order of CoplanarityPlane.
 std::vector<Jet> SceneJets(const PairScene& s) {
-  std::vector<double> values(s.lens.data(), s.lens.data() + 8);
+  std::vector<double> values(s.lens.data(), s.lens.data() + kReferenceLensSize);
   values.insert(values.end(), s.shutter.data(), s.shutter.data() + 2);
   values.insert(values.end(), s.q_gyro_cam.coeffs().data(), s.q_gyro_cam.coeffs().data() + 4);
   values.insert(values.end(), s.tau.data(), s.tau.data() + 3);
@@ -57,11 +58,11 @@ void ExpectMatchesReference(const ceres::CostFunction& factor, PairScene* s, boo
     ASSERT_NEAR(residuals[row], expected.a, 1e-9 * (1 + std::abs(expected.a)));
     int offset = 0;
     for (size_t block = 0; block < sizes.size(); ++block) {
-      const int size = sizes[block];
+      const int size = block == 0 ? kReferenceLensSize : sizes[block];
       if (!with_tau && block == CoplanarityPlane::kTauBlock) offset += 9;  // tau and bend
       const Eigen::VectorXd want = expected.v.segment(offset, size);
-      const Eigen::VectorXd have =
-          Eigen::Map<const Eigen::VectorXd>(jacobians[block] + static_cast<int>(row) * size, size);
+      const Eigen::VectorXd have = Eigen::Map<const Eigen::VectorXd>(
+          jacobians[block] + static_cast<int>(row) * sizes[block], size);
       const double scale = 1.0 + want.norm();
       if (block == 2) {  // the rotation's row has a meaning only in the tangent
         EXPECT_LT((plus.transpose() * (have - want)).norm() / scale, 1e-9) << "block 2";

@@ -329,6 +329,42 @@ TEST_F(ExportTest, ReversedReadout) {
   EXPECT_NEAR(lens["frame_readout_time"].get<double>(), -24.0, 1e-12);
 }
 
+TEST_F(ExportTest, KannalaBrandt) {
+  std::string text = ReadFile(std::string(kGolden) + "calibration.yaml");
+  text.replace(text.find("radtan, value: [-0.28, 0.07, 0.0002, 0.00002]"), 45,
+               "kannala_brandt, value: [0.02, -0.01, 0.006, -0.002]");
+  std::ofstream(Path("wide.yaml")) << text;
+  const auto exported = [&](const std::string& format, const std::string& file) {
+    EXPECT_EQ(Run("export wide.yaml --format=" + format + " --out=. --quiet").exit_code, 0);
+    return ReadFile(Path(file));
+  };
+  const auto coefficients = HasSubstr("[0.02, -0.01, 0.006, -0.002]  # k1, k2, k3, k4");
+  EXPECT_THAT(exported("kalibr", "camchain-imucam.yaml"),
+              AllOf(HasSubstr("distortion_model: equidistant\n"), coefficients));
+  EXPECT_THAT(exported("openvins", "kalibr_imucam_chain.yaml"),
+              AllOf(HasSubstr("distortion_model: equidistant\n"), coefficients));
+  const auto camodocal =
+      AllOf(HasSubstr("model_type: KANNALA_BRANDT\n"),
+            HasSubstr("   k2: 0.02\n   k3: -0.01\n   k4: 0.006\n   k5: -0.002\n   mu: 510\n   mv: "
+                      "500\n   u0: 320.5\n   v0: 239.5\n"));
+  EXPECT_THAT(exported("vins_mono", "vins_mono.yaml"), camodocal);
+  EXPECT_THAT(exported("vins_fusion", "cam0_kannala_brandt.yaml"), camodocal);
+  EXPECT_THAT(ReadFile(Path("vins_fusion.yaml")), HasSubstr("\"cam0_kannala_brandt.yaml\""));
+  const auto lens = nlohmann::json::parse(exported("gyroflow", "lens_profile.json"));
+  EXPECT_EQ(lens["distortion_model"], "opencv_fisheye");
+  EXPECT_EQ(lens["fisheye_params"]["distortion_coeffs"],
+            nlohmann::json({0.02, -0.01, 0.006, -0.002}));
+  const auto json = nlohmann::json::parse(exported("json", "calibration.json"));
+  EXPECT_EQ(json["distortion"]["model"], "kannala_brandt");
+  // What is written for a recording is read from it.
+  Simulate("duration_s: 0.2\ncamera: {resolution: [640, 480]}\n", "a");
+  std::ofstream(Path("a/cam0/sensor.yaml")) << exported("euroc", "cam0/sensor.yaml");
+  const Result<Recording> recording = ReadRecording(Path("a"));
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_EQ(recording->camera.distortion_model, DistortionModel::kKannalaBrandt);
+  EXPECT_THAT(recording->camera.distortion, testing::ElementsAre(0.02, -0.01, 0.006, -0.002));
+}
+
 TEST_F(ExportTest, BadUsageAndInput) {
   std::ofstream(Path("c.yaml")) << "camera: {resolution: [64, 48], focal_px: 50}\n";
   Simulate("duration_s: 0.2\n", "a");

@@ -32,7 +32,7 @@ TEST_F(ReadCalibrationTest, WhatWasWrittenIsWhatIsRead) {
   c.width_px = 320;
   c.height_px = 240;
   c.distortion_model = DistortionModel::kRadTan;
-  c.lens << 290.125, 161.5, 118.25, 1.0625, -0.25, 0.0625, 0.5e-3, -0.25e-3;
+  c.lens << 290.125, 161.5, 118.25, 1.0625, -0.25, 0.0625, 0.5e-3, -0.25e-3, 0.0, 0.0, 0.0, 0.0;
   c.readout_s = -0.0125;
   c.delay_s = 465.0625;
   c.bias_gyro_rad_s << 0.5, -0.25, 0.125;
@@ -52,9 +52,42 @@ TEST_F(ReadCalibrationTest, WhatWasWrittenIsWhatIsRead) {
   EXPECT_EQ(read->covariance, c.covariance);
   EXPECT_EQ(read->determined, c.determined);
 
+  c.distortion_model = DistortionModel::kKannalaBrandt;
+  c.lens.tail<8>() << 0.0, 0.0, 0.0, 0.0, 0.25, -0.125, 0.0625, 0.5e-3;
+  const Result<Calibration> wide = Read(CalibrationYaml(report, /*attitudes=*/false));
+  ASSERT_TRUE(wide) << wide.error().message;
+  EXPECT_EQ(wide->distortion_model, DistortionModel::kKannalaBrandt);
+  EXPECT_EQ(wide->lens, c.lens);
+
   const Result<Calibration> attitudes = Read(CalibrationYaml(report, /*attitudes=*/true));
   ASSERT_FALSE(attitudes);
   EXPECT_THAT(attitudes.error().message, HasSubstr("camera: focal_px: expected a finite number"));
+}
+
+// A fitted departure from the pinhole is written as the Kannala-Brandt lens nearest to it.
+TEST_F(ReadCalibrationTest, FittedKannalaBrandtIsWrittenInItsOwnCoefficients) {
+  CalibrationReport report;
+  Calibration& c = report.calibration;
+  c.width_px = 720;
+  c.height_px = 480;
+  c.lens = MakePinhole(400.0, {359.5, 239.5});
+  EffectSetup setup;
+  const Result<EffectSet> effects = MakeEffects("radial_distortion:kannala_brandt", setup);
+  ASSERT_TRUE(effects) << effects.error().message;
+  c.effects = std::make_shared<EffectSet>(*effects);
+  c.effect_values = Eigen::Vector4d(-0.32, -0.14, 0.0, -0.08);
+  c.effect_covariance = 1e-4 * Eigen::Matrix4d::Identity();
+  const std::string yaml = CalibrationYaml(report, /*attitudes=*/false);
+  EXPECT_THAT(yaml, HasSubstr("sigma: [0.01, 0.01, 0.01, 0.01]"));
+  const Result<Calibration> read = Read(yaml);
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->distortion_model, DistortionModel::kKannalaBrandt);
+  for (const double u : {0.0, 200.0, 700.0}) {
+    RayJet fitted, written;
+    ASSERT_TRUE(GetLens(c.distortion_model).Unproject({u, 100.0}, c.FullLens(), &fitted));
+    ASSERT_TRUE(GetLens(read->distortion_model).Unproject({u, 100.0}, read->lens, &written));
+    EXPECT_LT((fitted.ray - written.ray).norm(), 1e-3) << u;
+  }
 }
 
 TEST_F(ReadCalibrationTest, AbsentSectionsKeepDefaults) {
@@ -84,7 +117,7 @@ TEST_F(ReadCalibrationTest, TruthOfAnotherSimulator) {
   const Result<Calibration> read = ReadCalibration(*path);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->distortion_model, DistortionModel::kRadTan);
-  EXPECT_THAT(std::vector<double>(read->lens.data(), read->lens.data() + kLensSize),
+  EXPECT_THAT(std::vector<double>(read->lens.data(), read->lens.data() + kKb1),
               ElementsAre(457.296, 367.215, 248.375, 1.0029696, -0.28340811, 0.07395907, 0.00019359,
                           0.00001762));
   EXPECT_EQ(read->delay_s, 0.03);
@@ -114,8 +147,9 @@ TEST_F(ReadCalibrationTest, RefusesWithFileLineAndKey) {
       {"camera:\n  resolution: [64, 48]\n  focal_px: {value: -50}\n",
        "c.yaml:3: camera: focal_px: expected a number above zero"},
       {"camera: 7\n", "c.yaml:1: camera: expected a map"},
-      {camera + "  distortion: {model: kb4, value: [0, 0, 0, 0]}\n",
-       "c.yaml:4: camera: distortion: model: `kb4` is unknown, expected none or radtan"},
+      {camera + "  distortion: {model: omni, value: [0, 0, 0, 0]}\n",
+       "c.yaml:4: camera: distortion: model: `omni` is unknown, expected none, radtan or "
+       "kannala_brandt"},
       {camera + "  distortion:\n    model: radtan\n    value: [0, 0, 0]\n",
        "c.yaml:6: camera: distortion: expected a list of 4 numbers, got 3"},
       {camera + "  distortion: {model: radtan}\n", "distortion: expected value: [k1, k2, p1, p2]"},

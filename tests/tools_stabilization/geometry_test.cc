@@ -144,7 +144,8 @@ TEST_F(FrameWarpTest, TurnsEachRowByItsOwnTime) {
       path_->R_world_cam(40, 200.0) * Exp<double>({0.02, -0.03, 0.05}).toRotationMatrix();
   for (const double v : {3.0, 240.0, 470.0}) {
     RayJet jet;
-    ASSERT_TRUE(GetLens(c_.distortion_model).Unproject({400.0, v}, c_.lens, &jet, false));
+    ASSERT_TRUE(
+        GetLens(c_.distortion_model).Unproject({400.0, v}, c_.lens, &jet, LensDerivatives::kNone));
     const double time_s = 0.5 + 40 * 0.02 + c_.delay_s + c_.readout_s * v / 480.0;
     const auto expected =
         camera.Project(R_world_virtual.transpose() * path_->R_world_cam(time_s) * jet.ray);

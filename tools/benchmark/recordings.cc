@@ -49,8 +49,7 @@ Result<BenchmarkRecording> ReadForBenchmark(const std::string& path) {
   camera.focal_px = truth->lens[kFocal];
   camera.aspect_ratio = truth->lens[kAspect];
   camera.principal_px = truth->lens.segment<2>(kCx);
-  camera.distortion_model = truth->distortion_model;
-  camera.distortion.assign(truth->lens.data() + kK1, truth->lens.data() + kK1 + 4);
+  camera.SetDistortion(truth->distortion_model, truth->lens);
   result.recording = *std::move(recording);
 
   VinsOptions options = result.options;

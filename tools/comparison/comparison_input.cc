@@ -171,8 +171,7 @@ Result<Input> MakeInput(const Case& from, uint64_t run, StartKind start) {
   if (!status) return tl::unexpected(status.error());
   CameraGuess& camera = input.recording.camera;
   camera.aspect_ratio = input.truth.lens[kAspect];
-  camera.distortion_model = input.truth.distortion_model;
-  camera.distortion.assign(input.truth.lens.data() + kK1, input.truth.lens.data() + kLensSize);
+  camera.SetDistortion(input.truth.distortion_model, input.truth.lens);
   const double covered = CoveredFrames(input.recording, input.truth.delay_s);
   if (covered < 0.5) {
     return BadInput(input.recording.path + ": with the true delay, the gyro covers only " +

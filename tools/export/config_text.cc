@@ -24,6 +24,8 @@ std::map<std::string, std::string> CommonValues(const ExportInput& input) {
   const Calibration& c = input.calibration;
   const LensParameters& lens = c.lens;
   const double fx = lens[kFocal] * lens[kAspect], fy = lens[kFocal];
+  const bool wide = c.distortion_model == DistortionModel::kKannalaBrandt;
+  const Eigen::Vector4d k = lens.segment<4>(FirstCoefficient(c.distortion_model));
   std::map<std::string, std::string> values = {
       {"source", input.source},
       {"width", std::to_string(c.width_px)},
@@ -32,12 +34,14 @@ std::map<std::string, std::string> CommonValues(const ExportInput& input) {
       {"fy", Number(fy)},
       {"cx", Number(lens[kCx])},
       {"cy", Number(lens[kCy])},
-      {"k1", Number(lens[kK1])},
-      {"k2", Number(lens[kK2])},
-      {"p1", Number(lens[kP1])},
-      {"p2", Number(lens[kP2])},
       {"intrinsics", List({fx, fy, lens[kCx], lens[kCy]})},
-      {"distortion", List({lens[kK1], lens[kK2], lens[kP1], lens[kP2]})},
+      {"distortion", List({k[0], k[1], k[2], k[3]})},
+      {"k1", Number(k[0])},
+      {"k2", Number(k[1])},
+      {"k3", Number(k[2])},
+      {"k4", Number(k[3])},
+      {"distortion_model", wide ? "equidistant" : "radtan"},
+      {"distortion_names", wide ? "k1, k2, k3, k4" : "k1, k2, p1, p2"},
       {"line_delay", Number(c.readout_s / c.height_px)},
       {"readout", Number(c.readout_s)},
       {"delay", Number(c.delay_s)},

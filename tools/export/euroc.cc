@@ -42,14 +42,18 @@ accelerometer_random_walk: @accel_walk@  # [m/s^3/sqrt(Hz)] @accel_walk_origin@
 
 std::vector<ExportedFile> ExportEuroc(const ExportInput& input) {
   const Calibration& c = input.calibration;
-  const bool distorted = c.distortion_model == DistortionModel::kRadTan;
+  const bool distorted = c.distortion_model != DistortionModel::kNone;
   auto values = CommonValues(input);
   values["T_BS"] = RowMajor(Pose(c.q_gyro_cam));
   values["rate"] = input.recording
                        ? "rate_hz: " + Number(1.0 / MedianInterval(input.recording->frames)) +
                              "  # from the recording\n"
                        : "";
-  values["distortion_model"] = distorted ? "radial-tangential" : "none";
+  if (c.distortion_model == DistortionModel::kRadTan) {
+    values["distortion_model"] = "radial-tangential";
+  } else if (!distorted) {
+    values["distortion_model"] = "none";
+  }
   values["distortion_list"] = distorted ? values["distortion"] : "[]";
   return {{"cam0/sensor.yaml", FillIn(kCamera, values)},
           {"imu0/sensor.yaml", FillIn(kImu, values)}};

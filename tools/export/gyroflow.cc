@@ -31,6 +31,8 @@ Eigen::Vector3d GyroflowAxes(const Eigen::Vector3d& cam) { return {-cam.y(), -ca
 Json LensProfile(const ExportInput& input) {
   const Calibration& c = input.calibration;
   const LensParameters& lens = c.lens;
+  const bool wide = c.distortion_model == DistortionModel::kKannalaBrandt;
+  const Eigen::Vector4d k = lens.segment<4>(FirstCoefficient(c.distortion_model));
   const Json size = {{"w", c.width_px}, {"h", c.height_px}};
   const double frame_s = input.recording ? MedianInterval(input.recording->frames) : 0.0;
   return {{"name", "camgyro " + std::to_string(c.width_px) + "x" + std::to_string(c.height_px)},
@@ -58,13 +60,13 @@ Json LensProfile(const ExportInput& input) {
              {{lens[kFocal] * lens[kAspect], 0.0, lens[kCx]},
               {0.0, lens[kFocal], lens[kCy]},
               {0.0, 0.0, 1.0}}},
-            {"distortion_coeffs", {lens[kK1], lens[kK2], lens[kP1], lens[kP2]}},
+            {"distortion_coeffs", {k[0], k[1], k[2], k[3]}},
             {"radial_distortion_limit", nullptr}}},
           {"identifier", ""},
           {"calibrator_version", "camgyro"},
           {"date", ""},
           {"compatible_settings", Json::array()},
-          {"distortion_model", "opencv_standard"},
+          {"distortion_model", wide ? "opencv_fisheye" : "opencv_standard"},
           {"global_shutter", c.readout_s == 0.0}};
 }
 

@@ -16,8 +16,8 @@ constexpr char kCamchain[] =
 cam0:
   camera_model: pinhole
   intrinsics: @intrinsics@  # fu, fv, pu, pv [px]
-  distortion_model: radtan
-  distortion_coeffs: @distortion@  # k1, k2, p1, p2
+  distortion_model: @distortion_model@
+  distortion_coeffs: @distortion@  # @distortion_names@
   resolution: [@width@, @height@]
   line_delay: @line_delay@  # [s] per row; negative: bottom to top
   timeshift_cam_imu: @delay@  # [s] of row 0

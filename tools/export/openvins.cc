@@ -18,8 +18,8 @@ cam0:
   T_imu_cam:
 @T_imu_cam@  cam_overlaps: []
   camera_model: pinhole
-  distortion_coeffs: @distortion@  # k1, k2, p1, p2
-  distortion_model: radtan
+  distortion_coeffs: @distortion@  # @distortion_names@
+  distortion_model: @distortion_model@
   intrinsics: @intrinsics@  # fu, fv, cu, cv [px]
   resolution: [@width@, @height@]
   rostopic: /cam0/image_raw

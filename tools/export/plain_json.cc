@@ -34,8 +34,11 @@ std::vector<ExportedFile> ExportJson(const ExportInput& input) {
   json["resolution"] = {c.width_px, c.height_px};
   json["focal_px"] = {lens[kFocal] * lens[kAspect], lens[kFocal]};
   json["principal_px"] = {lens[kCx], lens[kCy]};
-  json["distortion"] = {{"model", DistortionModelName(c.distortion_model)},
-                        {"k1_k2_p1_p2", {lens[kK1], lens[kK2], lens[kP1], lens[kP2]}}};
+  const bool wide = c.distortion_model == DistortionModel::kKannalaBrandt;
+  json["distortion"] = {
+      {"model", DistortionModelName(c.distortion_model)},
+      {wide ? "k1_k2_k3_k4" : "k1_k2_p1_p2",
+       list(Eigen::Vector4d(lens.segment<4>(FirstCoefficient(c.distortion_model))))}};
   json["readout_s"] = c.readout_s;
   json["delay_s"] = c.delay_s;
   json["delay_middle_row_s"] = MiddleRowDelayS(c);

@@ -12,20 +12,36 @@
 namespace camgyro {
 namespace {
 
-constexpr char kCamera[] = R"(model_type: PINHOLE
+constexpr char kPinhole[] = R"(model_type: PINHOLE
 camera_name: camera
 image_width: @width@
 image_height: @height@
 distortion_parameters:
    k1: @k1@
    k2: @k2@
-   p1: @p1@
-   p2: @p2@
+   p1: @k3@
+   p2: @k4@
 projection_parameters:
    fx: @fx@
    fy: @fy@
    cx: @cx@
    cy: @cy@
+)";
+
+// camodocal counts the coefficients from that of theta^1, which is 1.
+constexpr char kKannalaBrandt[] = R"(model_type: KANNALA_BRANDT
+camera_name: camera
+image_width: @width@
+image_height: @height@
+projection_parameters:
+   k2: @k1@
+   k3: @k2@
+   k4: @k3@
+   k5: @k4@
+   mu: @fx@
+   mv: @fy@
+   u0: @cx@
+   v0: @cy@
 )";
 
 constexpr char kTracking[] = R"(
@@ -105,7 +121,7 @@ num_of_cam: 1
 imu_topic: "/imu0"
 image0_topic: "/cam0/image_raw"
 output_path: "output/"
-cam0_calib: "cam0_pinhole.yaml"
+cam0_calib: "@camera_file@"
 image_width: @width@
 image_height: @height@
 
@@ -131,24 +147,34 @@ pose_graph_save_path: "output/pose_graph/"
 save_image: 0
 )";
 
+// Name and text of the camera's file.
+std::pair<std::string, std::string> CameraOf(const Calibration& c) {
+  if (c.distortion_model == DistortionModel::kKannalaBrandt) {
+    return {"cam0_kannala_brandt.yaml", kKannalaBrandt};
+  }
+  return {"cam0_pinhole.yaml", kPinhole};
+}
+
 }  // namespace
 
 std::vector<ExportedFile> ExportVinsMono(const ExportInput& input) {
   auto values = CommonValues(input);
   values["R_imu_cam"] = RowMajor(input.calibration.q_gyro_cam.toRotationMatrix());
   values["rolling"] = input.calibration.readout_s == 0.0 ? "0" : "1";
-  return {{"vins_mono.yaml", FillIn(std::string(kMonoHead) + kCamera + kMonoExtrinsic + kTracking +
-                                        kSolver + kMonoTail,
+  return {{"vins_mono.yaml", FillIn(kMonoHead + CameraOf(input.calibration).second +
+                                        kMonoExtrinsic + kTracking + kSolver + kMonoTail,
                                     values)}};
 }
 
 std::vector<ExportedFile> ExportVinsFusion(const ExportInput& input) {
   auto values = CommonValues(input);
   values["T_imu_cam"] = RowMajor(Pose(input.calibration.q_gyro_cam));
+  const auto [camera_file, camera] = CameraOf(input.calibration);
+  values["camera_file"] = camera_file;
   return {
       {"vins_fusion.yaml",
        FillIn(std::string(kFusion) + kTracking + "flow_back: 1\n" + kSolver + kFusionTail, values)},
-      {"cam0_pinhole.yaml", FillIn(std::string("%YAML:1.0\n---\n") + kCamera, values)}};
+      {camera_file, FillIn("%YAML:1.0\n---\n" + camera, values)}};
 }
 
 }  // namespace camgyro

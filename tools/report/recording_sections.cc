@@ -50,8 +50,11 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
   const LensParameters lens = calibration.FullLens();
   camera.aspect_ratio = lens[kAspect];
   camera.principal_px = Eigen::Vector2d(lens[kCx], lens[kCy]);
-  camera.distortion_model = DistortionModel::kRadTan;  // of which the others are cases
-  camera.distortion.assign(lens.data() + kK1, lens.data() + kLensSize);
+  const Eigen::Vector2d size_px(calibration.width_px, calibration.height_px);
+  const DistortionCoefficients distortion =
+      StandardDistortion(calibration.distortion_model, lens, size_px);
+  camera.distortion_model = distortion.model;
+  camera.distortion.assign(distortion.k.data(), distortion.k.data() + 4);
   return CameraRotationsOf(SpreadPairs(pairs, kMaxCameraPoints), camera, lens[kFocal]);
 }
 

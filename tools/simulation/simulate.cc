@@ -237,7 +237,11 @@ Calibration Truth(const Scenario& scenario) {
   const Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
   truth.lens = MakePinhole(camera.focal_px, camera.principal_px.value_or(centre),
                            effects.aspect_ratio.ratio);
-  if (!effects.radial_distortion.kannala_brandt) {
+  if (effects.radial_distortion.kannala_brandt) {
+    const Effects::Lens& k = effects.radial_distortion;
+    truth.lens.segment<4>(kKb1) << k.k1, k.k2, k.k3, k.k4;
+    truth.distortion_model = DistortionModel::kKannalaBrandt;
+  } else {
     truth.lens.segment<4>(kK1) << effects.radial_distortion.k1, effects.radial_distortion.k2,
         effects.tangential_distortion.p1, effects.tangential_distortion.p2;
     const bool distorted = !truth.lens.segment<4>(kK1).isZero(0.0);

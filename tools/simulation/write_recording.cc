@@ -179,22 +179,18 @@ std::vector<Parameter> ParametersOf(const std::string& name, const Effects& e) {
 Status WriteTruth(const Simulated& s, const Scenario& scenario, const fs::path& root) {
   const Calibration& truth = s.truth;
   const LensParameters& lens = truth.lens;
-  const bool wide = scenario.effects.radial_distortion.kannala_brandt;
   TextFile file(root / "truth.yaml");
   file.Print("# What is true of this simulated recording; keys of calibration.yaml.\n");
   file.Print("camera:\n  resolution: [%d, %d]\n  focal_px: {value: %.9g}\n", truth.width_px,
              truth.height_px, lens[kFocal]);
   file.Print("  principal_px: {value: [%.9g, %.9g]}\n  aspect_ratio: {value: %.9g}\n", lens[kCx],
              lens[kCy], lens[kAspect]);
-  if (wide) {
-    const Effects::Lens& k = scenario.effects.radial_distortion;
-    file.Print("  distortion: {model: kb4, value: [%.9g, %.9g, %.9g, %.9g]}\n", k.k1, k.k2, k.k3,
-               k.k4);
-  } else if (truth.distortion_model == DistortionModel::kRadTan) {
-    file.Print("  distortion: {model: radtan, value: [%.9g, %.9g, %.9g, %.9g]}\n", lens[kK1],
-               lens[kK2], lens[kP1], lens[kP2]);
-  } else {
+  if (truth.distortion_model == DistortionModel::kNone) {
     file.Print("  distortion: {model: none, value: []}\n");
+  } else {
+    const Eigen::Vector4d k = lens.segment<4>(FirstCoefficient(truth.distortion_model));
+    file.Print("  distortion: {model: %s, value: [%.9g, %.9g, %.9g, %.9g]}\n",
+               DistortionModelName(truth.distortion_model).c_str(), k[0], k[1], k[2], k[3]);
   }
   file.Print("shutter: {readout_s: {value: %.9g}}\n", truth.readout_s);
   file.Print("clock: {delay_s: {value: %.9g}}  # without the effects below\n", truth.delay_s);

@@ -54,7 +54,7 @@ Eigen::Matrix3d FrameWarp::R_virtual_cam(double row_px) const {
 
 std::optional<Eigen::Vector2d> FrameWarp::ToVirtual(const Eigen::Vector2d& px) const {
   RayJet jet;
-  if (!lens_.Unproject(px, calibration_.lens, &jet, /*derivatives_by_lens=*/false)) {
+  if (!lens_.Unproject(px, calibration_.lens, &jet, LensDerivatives::kNone)) {
     return std::nullopt;
   }
   return camera_.Project(R_virtual_cam(px.y()) * jet.ray);
