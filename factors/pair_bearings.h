@@ -29,7 +29,7 @@ struct PairMeasurement {
   // Rates that the pair needs: their times, strictly increasing, split into consecutive groups of
   // these sizes (in samples), each with a parameter block. A parameter is the rate of a sample, or
   // with a step > 1 a correction of the rates rate_base of that many samples of the group in a row:
-  // noise that is white over some 15 ms turns nothing that a pixel could see.
+  // noise that is white over some 25 ms turns nothing that a pixel could see.
   std::vector<double> rate_times_s;
   std::vector<int> rate_group_sizes;
   int rate_step = 1;

@@ -167,8 +167,7 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
   const Eigen::Index samples = view.rates.cols();
   const double interval_s =
       (measurement->rate_times_s.back() - measurement->rate_times_s.front()) / (samples - 1.0);
-  const Eigen::Index step =
-      std::max<Eigen::Index>(1, std::lround(options.rate_step_s / interval_s));
+  const Eigen::Index step = options.RateStep(interval_s, c.lens[kFocal]);
   const Eigen::Index values = (samples + step - 1) / step;
   s->N.setZero(e.r.size(), 8 + 3 * values);
   s->N.col(0) = e.J[CoplanarityPlane::kTauBlock] * u;

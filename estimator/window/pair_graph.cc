@@ -44,6 +44,12 @@ std::vector<double> Intervals(const std::deque<TimedRate>& samples) {
 
 }  // namespace
 
+int PairGraphOptions::RateStep(double interval_s, double focal_px) const {
+  const double walk_px = gyro_sigma_rad_s.maxCoeff() * interval_s * focal_px;  // of a sample
+  const double samples = 12.0 * rate_step_px * rate_step_px / (walk_px * walk_px);
+  return std::max(1, static_cast<int>(std::min(samples, std::round(rate_step_s / interval_s))));
+}
+
 PairGraph::PairGraph(const Calibration& start, const Calibration& prior_mean,
                      const PairGraphOptions& options)
     : options_(options), prior_mean_(prior_mean) {
@@ -158,7 +164,7 @@ int PairGraph::RateStep() const {
       if (item.entry->part == ModelPart::kRate) return 1;
     }
   }
-  return std::max(1, static_cast<int>(std::lround(options_.rate_step_s / median_interval_s_)));
+  return options_.RateStep(median_interval_s_, prior_mean_.lens[kFocal]);
 }
 
 AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, int step,

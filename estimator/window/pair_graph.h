@@ -52,9 +52,13 @@ struct PairGraphOptions {
   // Samples kept on both sides of a pair, so that delay and readout can move in a solve. Beyond,
   // rates are held.
   double rate_margin_s = 0.004;
-  // Noise of the gyro is estimated as its mean over so long; one value per sample where effects
-  // change the rates.
-  double rate_step_s = 0.015;
+  // Noise of the gyro is estimated as its mean over so long, or less where what that neglects, a
+  // random walk of the angle within the step, would turn the picture by more than so many pixels
+  // (rms); one value per sample where effects change the rates.
+  double rate_step_s = 0.025;
+  double rate_step_px = 0.05;
+  // That many samples.
+  int RateStep(double interval_s, double focal_px) const;
 };
 
 // One gyro sample of the graph's clock: seconds from the graph's origin.

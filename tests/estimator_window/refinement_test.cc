@@ -173,6 +173,17 @@ TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
   EXPECT_EQ(residuals_of(3), -1);  // fewer than 8 left
 }
 
+TEST(PairGraph, NoisyGyrosHaveShorterRateSteps) {
+  PairGraphOptions options;
+  options.gyro_sigma_rad_s.setConstant(0.003);  // of a phone, at 200 Hz
+  EXPECT_EQ(options.RateStep(0.005, 650.0), 5);
+  EXPECT_EQ(options.RateStep(0.05, 650.0), 1);
+  options.gyro_sigma_rad_s.setConstant(0.03);  // 0.1 px per sample
+  EXPECT_EQ(options.RateStep(0.005, 650.0), 3);
+  options.gyro_sigma_rad_s.setConstant(0.3);
+  EXPECT_EQ(options.RateStep(0.005, 650.0), 1);
+}
+
 // Directions that the parallax determines take the degrees of freedom that are counted; the best of
 // many that all say nothing takes more, which widens the sigmas.
 TEST(PairGraph, DirectionsWithoutParallaxWidenTheSigmas) {
