@@ -5,60 +5,12 @@
 #include <cstdio>
 
 #include "core/so3.h"
+#include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/diagnose.h"
 #include "estimator/window/pair_view.h"
 
 namespace camgyro {
 namespace {
-
-// A candidate: an effect in one shape.
-struct Candidate {
-  const EffectEntry* entry = nullptr;
-  std::string shape;
-  std::shared_ptr<const Effect> effect;
-  int first = 0;  // column in the scores
-  std::vector<int> columns() const {
-    std::vector<int> c(static_cast<size_t>(effect->size()));
-    for (size_t i = 0; i < c.size(); ++i) c[i] = first + static_cast<int>(i);
-    return c;
-  }
-};
-
-// The model's effects and one more; another shape of the same effect takes its place, steps of the
-// delay add up. Values carry over.
-void AddEffect(const Candidate& candidate, Calibration* calibration) {
-  auto set = std::make_shared<EffectSet>();
-  std::vector<double> values;
-  if (calibration->effects) {
-    for (const auto& item : calibration->effects->items()) {
-      if (item.entry == candidate.entry && item.entry->name != "delay_step") continue;
-      set->Add(item.entry, item.shape, item.effect);
-      for (int k = 0; k < item.effect->size(); ++k) {
-        values.push_back(calibration->effect_values[item.first + k]);
-      }
-    }
-  }
-  set->Add(candidate.entry, candidate.shape, candidate.effect);
-  values.resize(static_cast<size_t>(set->size()), 0.0);
-  calibration->effects = set;
-  calibration->effect_values =
-      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-  calibration->effect_covariance = Eigen::MatrixXd::Zero(set->size(), set->size());
-}
-
-Eigen::VectorXd PriorInformation(const Calibration& prior, const EffectSet* model,
-                                 const EffectSet& candidates) {
-  const int present = model != nullptr ? model->size() : 0;
-  Eigen::VectorXd information(kStateSize + present + candidates.size());
-  information.head<kStateSize>() = prior.prior_sigma.cwiseAbs2().cwiseInverse();
-  for (int i = 0; i < present; ++i) {
-    information[kStateSize + i] = std::pow(model->parameter(i).spread, -2.0);
-  }
-  for (int i = 0; i < candidates.size(); ++i) {
-    information[kStateSize + present + i] = std::pow(candidates.parameter(i).spread, -2.0);
-  }
-  return information;
-}
 
 // Fall of chi2 by block; blocks that one of the two could not evaluate count nothing.
 std::vector<double> Fall(const Scores& before, const Scores& after) {
@@ -144,7 +96,12 @@ class Loop {
     std::sort(where.begin(), where.end());
     for (const auto& entry : where) out->where.push_back(entry.second);
     out->unexplained_structure = !where.empty();
-    Aliases(out);
+    out->indistinguishable = Indistinguishable(
+        fit_.calibration, MakeEffectSetup(*in_.recording, fit_.calibration), in_.prior,
+        [this](const Calibration& calibration, std::shared_ptr<const EffectSet> candidates) {
+          return ScoresOf(shares_.choice, calibration, std::move(candidates),
+                          fit_.quality.noise_px);
+        });
     if (fit_.calibration.effects) {
       for (const auto& item : fit_.calibration.effects->items()) {
         out->effects.push_back(item.entry->name);
@@ -159,7 +116,6 @@ class Loop {
   static constexpr int kLongestGap = 3;  // what comes and goes within frames is to be seen
   static constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
   static constexpr double kOverwhelming = 1e-5;
-  static constexpr double kAliasLimit = 0.95;
   static constexpr double kStrongMisfit = 0.02;  // gain of one effect over chi2
 
   // Leaves every n-th pair, so that at most `most` stay.
@@ -205,35 +161,12 @@ class Loop {
     return ComputeScores(input_, blocks, calibration, std::move(candidates), noise, in_.graph);
   }
 
-  std::vector<Candidate> Candidates(const EffectSetup& setup) const {
-    std::vector<Candidate> candidates;
-    const EffectSet* model = fit_.calibration.effects.get();
-    for (const EffectEntry& entry : EffectCatalogue()) {
-      size_t present_size = 0;
-      bool present = false;
-      if (model != nullptr) {
-        for (const auto& item : model->items()) {
-          if (item.entry != &entry) continue;
-          present = true;
-          present_size = static_cast<size_t>(item.effect->size());
-        }
-      }
-      for (const std::string& shape : entry.shapes(setup)) {
-        std::shared_ptr<const Effect> effect = entry.make(setup, shape);
-        if (effect == nullptr || effect->turn_sigma_rad_s() > 0.0) continue;
-        if (present && static_cast<size_t>(effect->size()) <= present_size) continue;
-        candidates.push_back({&entry, shape, std::move(effect), 0});
-      }
-    }
-    return candidates;
-  }
-
   // One round. True if an effect was added (fit_ has it then).
   bool Round(int round, DiagnosisRound* result, bool may_add = true) {
     const Calibration& model = fit_.calibration;
     const double noise = fit_.quality.noise_px;
     const EffectSetup setup = MakeEffectSetup(*in_.recording, model);
-    std::vector<Candidate> candidates = Candidates(setup);
+    std::vector<Candidate> candidates = MissingEffects(model, setup);
     auto set = std::make_shared<EffectSet>();
     const int present = kStateSize + static_cast<int>(model.effect_values.size());
     for (Candidate& candidate : candidates) {
@@ -531,45 +464,6 @@ class Loop {
   }
 
   double FitChi2(const Refined& fit) const { return fit.quality.rms_px; }
-
-  // Pairs of effects, one of them in the model or found significant, that this motion cannot tell
-  // apart.
-  void Aliases(Diagnosis* out) const {
-    if (!fit_.calibration.effects) return;
-    Calibration plain = fit_.calibration;
-    const EffectSetup setup = MakeEffectSetup(*in_.recording, plain);
-    auto set = std::make_shared<EffectSet>();
-    std::vector<Candidate> all;
-    for (const auto& item : fit_.calibration.effects->items()) {
-      all.push_back({item.entry, item.shape, item.effect, 0});
-    }
-    const size_t in_model = all.size();
-    for (const Candidate& candidate : Candidates(setup)) {
-      if (!fit_.calibration.effects->Has(candidate.entry->name)) all.push_back(candidate);
-    }
-    for (Candidate& candidate : all) {
-      candidate.first = kStateSize + set->size();
-      set->Add(candidate.entry, candidate.shape, candidate.effect);
-    }
-    // Scores at the fit, but with the effects as candidates, so that they are not projected out:
-    // the derivatives hardly depend on where they are taken.
-    plain.effects = nullptr;
-    plain.effect_values.resize(0);
-    plain.lens = fit_.calibration.FullLens();
-    const Scores scores = ScoresOf(shares_.choice, plain, set, fit_.quality.noise_px);
-    if (scores.blocks.size() < 4) return;
-    const Eigen::VectorXd prior = PriorInformation(in_.prior, nullptr, *set);
-    for (size_t i = 0; i < in_model; ++i) {
-      for (size_t j = i + 1; j < all.size(); ++j) {
-        if (all[i].columns().empty() || all[j].columns().empty()) continue;
-        // A flexible curve contains simpler effects: that is no alias of the motion.
-        if (all[j].columns().size() > 3 * all[i].columns().size() + 3) continue;
-        if (AliasOf(scores, all[i].columns(), all[j].columns(), prior) > kAliasLimit) {
-          out->indistinguishable.push_back({all[i].entry->name, all[j].entry->name});
-        }
-      }
-    }
-  }
 
   const LoopInput& in_;
   const DiagnoseOptions& options_;

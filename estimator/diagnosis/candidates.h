@@ -1,0 +1,49 @@
+// What the catalogue offers beyond a model.
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_CANDIDATES_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_CANDIDATES_H_
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/calibration.h"
+#include "core/effects/catalogue.h"
+#include "estimator/diagnosis/pair_scores.h"
+
+namespace camgyro {
+
+// A candidate: an effect in one shape.
+struct Candidate {
+  const EffectEntry* entry = nullptr;
+  std::string shape;
+  std::shared_ptr<const Effect> effect;
+  int first = 0;  // column in the scores
+  std::vector<int> columns() const {
+    std::vector<int> c(static_cast<size_t>(effect->size()));
+    for (size_t i = 0; i < c.size(); ++i) c[i] = first + static_cast<int>(i);
+    return c;
+  }
+};
+
+// Effects with parameters that the model has not, or only in a shape with fewer of them.
+std::vector<Candidate> MissingEffects(const Calibration& model, const EffectSetup& setup);
+
+// The model's effects and one more; another shape of the same effect takes its place, steps of the
+// delay add up. Values carry over.
+void AddEffect(const Candidate& candidate, Calibration* calibration);
+
+// 1 / sigma^2 of the priors: state, effects of the model (may be null), candidates.
+Eigen::VectorXd PriorInformation(const Calibration& prior, const EffectSet* model,
+                                 const EffectSet& candidates);
+
+// Pairs of effects, one of them in the model, that this motion cannot tell apart. scores_of:
+// makes the scores of a calibration with candidates.
+std::vector<std::vector<std::string>> Indistinguishable(
+    const Calibration& fit, const EffectSetup& setup, const Calibration& prior,
+    const std::function<Scores(const Calibration&, std::shared_ptr<const EffectSet>)>& scores_of);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_CANDIDATES_H_
