@@ -239,7 +239,8 @@ class Loop {
   // effect itself, beyond twice the noise that the gain of a right effect has, 2 sqrt(gain),
   // inflated as the test; a right effect then makes hardly any block worse. Where both shares
   // together leave no doubt, the half of the data that tells the gain only has to agree: with its
-  // sign, and with half of the statistic, which is what a right effect gains there.
+  // sign, with half of the statistic, which is what a right effect gains there, and with a scatter
+  // that is not beyond twice a right effect's (structure that lacks a name has more).
   static bool IsSure(const CandidateResult& r, double tests) {
     const Gain& gain = r.gain;
     const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, r.inflation));
@@ -247,8 +248,9 @@ class Loop {
       return true;
     }
     const double expected = 0.5 * r.statistic * r.inflation;
+    const double of_expected = 2.0 * std::sqrt(expected * r.inflation);
     return r.p_value * tests < kOverwhelming && gain.sum > 0.0 &&
-           gain.sum + 2.0 * gain.sigma > expected;
+           gain.sum + 2.0 * of_expected > expected && gain.sigma < 2.0 * of_expected;
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
