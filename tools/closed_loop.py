@@ -17,6 +17,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import matplotlib
+import numpy as np
 import yaml
 
 matplotlib.use("Agg")
@@ -194,6 +195,47 @@ def plot_image(results, name, file):
     plt.close(figure)
 
 
+def plot_lens(results, file):
+    """Radial profile of euroc's lens as found, against two published calibrations of this camera,
+    up to one scale each, which is f's. Returns a sentence with the numbers."""
+    result = next((r for r in results if r["name"] == "euroc-v101-flight"), None)
+    if result is None or "calibration" not in result:
+        return ""
+    camera = result["calibration"]["camera"]
+    if camera["distortion"]["model"] != "kannala_brandt":
+        return ""
+    angle = np.linspace(0.01, 0.75, 75)  # to the corners of the picture
+    tangent = np.tan(angle)
+    k = camera["distortion"]["value"]
+    found = camera["focal_px"]["value"] * sum(
+        c * angle ** (2 * i + 1) for i, c in enumerate([1.0] + k))
+    # original/cam0_sensor.yaml: fv, k1, k2
+    radtan = 457.296 * tangent * (1 - 0.28340811 * tangent**2 + 0.07395907 * tangent**4)
+    # Basalt (gitlab.com/VladyslavUsenko/basalt), data/euroc_ds_calib.json: fy, xi, alpha
+    fy, xi, alpha = 348.72454229977037, -0.2409573942178872, 0.566996899163044
+    shifted = xi + np.cos(angle)
+    sphere = fy * np.sin(angle) / (alpha * np.hypot(np.sin(angle), shifted) +
+                                   (1 - alpha) * shifted)
+    figure, axis = plt.subplots(figsize=(6, 3))
+    said = []
+    for profile, colour, label in ((radtan, BEFORE, "published, radtan"),
+                                   (found, AFTER, "found, kannala_brandt")):
+        scale = profile @ sphere / (sphere @ sphere)
+        left = profile / scale - sphere
+        axis.plot(np.degrees(angle), left, color=colour, label=label)
+        said.append("%s: scale %.4f, largest difference %.2f px" % (
+            label, scale, np.abs(left).max()))
+    axis.axhline(0, color="0.6", linewidth=0.8)
+    axis.set_xlabel("angle from the axis [deg]")
+    axis.set_ylabel("radius, less that of\nBasalt's double sphere [px]")
+    axis.legend(frameon=False)
+    figure.suptitle("euroc-v101-flight: two calibrations against a third")
+    figure.tight_layout()
+    figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
+    plt.close(figure)
+    return "Against Basalt's double sphere calibration of euroc's camera: %s.\n" % "; ".join(said)
+
+
 def write(results):
     """The document from what is there so far: a long run that is cut off leaves what it has."""
     results = sorted(results, key=lambda r: NAMES.index(r["name"]))
@@ -206,6 +248,7 @@ def write(results):
                    ("time [s]", "delay left [ms]"), "closed_loop_skew.svg")
     plot_image(results, "ov_handheld_rs", "closed_loop_ov.svg")
     plot_image(results, "euroc-v101-flight", "closed_loop_euroc.svg")
+    lens = plot_lens(results, "closed_loop_lens.svg")
     missing = [name for name in NAMES if name not in [r["name"] for r in results]]
     with open(SOURCE + "/docs/closed_loop.md", "w", encoding="utf-8") as out:
         out.write("# The closed loop on measured data\n\nMade by `tools/closed_loop.py`; the text "
@@ -223,6 +266,7 @@ def write(results):
         out.write("\n## Size of the effects\n\nFrom the fit on all frames.\n\n")
         out.write(table(["Recording", "Effect", "Parameter", "Value"],
                         [p for r in results for p in parameters(r)]))
+        out.write("\n" + lens)
         out.write("\n## Calibration without and with the effects\n\n")
         out.write(table(["Recording", "f [px]", "t_r [ms]", "t_d [ms]", "f with", "t_r with",
                          "t_d with"], [state(r) for r in results if "calibration_before" in r]))
