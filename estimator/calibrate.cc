@@ -227,6 +227,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     estimate.effects = std::make_shared<const EffectSet>(std::move(*effects));
   }
   const PairGraphOptions graph_options = GraphOptionsFor(recording, *start, options);
+  const Calibration from_start = estimate;
 
   if (!attitudes && options.online) {
     SlidingWindowOptions window_options = options.window;
@@ -334,7 +335,11 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
       if (both) halves_chi2 = HalvesChi2(fits[0], fits[1]);
     }
     tell("refinement", 0.6);
-    const Result<Refined> refined = Refine(input, input.pairs, from, prior, refinement);
+    Result<Refined> refined = Refine(input, input.pairs, from, prior, refinement);
+    if (!refined && report.online) {  // a window that has run away, to a lens without rays
+      refined = refine(from_start, options.refinement.graph.sigma_px);
+      report.notes.push_back("the online estimate leads nowhere; all frames fitted from the start");
+    }
     if (!refined) return tl::unexpected(refined.error());
     report.calibration = refined->calibration;
     report.quality = refined->quality;
