@@ -238,19 +238,21 @@ class Loop {
   // effect acts in some blocks only (a step early in the recording) so that the scatter is the
   // effect itself, beyond twice the noise that the gain of a right effect has, 2 sqrt(gain),
   // inflated as the test; a right effect then makes hardly any block worse. Where both shares
-  // together leave no doubt, the half of the data that tells the gain only has to agree: with its
-  // sign, with half of the statistic, which is what a right effect gains there, and with a scatter
-  // that is not beyond twice a right effect's (structure that lacks a name has more).
+  // together leave no doubt, once its scatter is enough, or the half of the data that tells the
+  // gain only has to agree: with its sign, with half of the statistic, which is what a right effect
+  // gains there, and with a scatter that is not beyond twice a right effect's (structure that lacks
+  // a name has more).
   static bool IsSure(const CandidateResult& r, double tests) {
     const Gain& gain = r.gain;
     const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, r.inflation));
     if (gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum)) {
       return true;
     }
+    if (r.p_value * tests > kOverwhelming) return false;
     const double expected = 0.5 * r.statistic * r.inflation;
     const double of_expected = 2.0 * std::sqrt(expected * r.inflation);
-    return r.p_value * tests < kOverwhelming && gain.sum > 0.0 &&
-           gain.sum + 2.0 * of_expected > expected && gain.sigma < 2.0 * of_expected;
+    return gain.sum > gain.sigma || (gain.sum > 0.0 && gain.sum + 2.0 * of_expected > expected &&
+                                     gain.sigma < 2.0 * of_expected);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
