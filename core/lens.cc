@@ -238,11 +238,6 @@ std::string DistortionModelName(DistortionModel model) {
   return "none";
 }
 
-void DistortionCoefficients::WriteTo(LensParameters* lens) const {
-  lens->tail<kLensSize - kK1>().setZero();
-  lens->segment<4>(FirstCoefficient(model)) = k;
-}
-
 DistortionCoefficients StandardDistortion(DistortionModel model, const LensParameters& lens,
                                           const Eigen::Vector2d& size_px) {
   DistortionCoefficients result;

@@ -85,7 +85,6 @@ struct DistortionCoefficients {
   DistortionModel model = DistortionModel::kNone;
   Eigen::Vector4d k = Eigen::Vector4d::Zero();  // of `model`
   Eigen::Matrix<double, 4, kLensSize> by_lens;  // derivative of k
-  void WriteTo(LensParameters* lens) const;     // instead of what `lens` has
 };
 // Of a pinhole with kb: the Kannala-Brandt lens that is nearest to it, along the rays of a picture
 // of this size (rms; a tangential part is left out).

@@ -122,9 +122,17 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
                 c.shape == "constant" ? "" : (" (" + c.shape + ")").c_str(),
                 FindEffect(c.name)->explanation.c_str());
   if (c.estimate.size() > 0) text += "     " + ValueText(c) + "\n";
+  text += c.tried_anyway
+              ? "     how sure: without it the fit runs away, so that its score says nothing"
+              : Format("     how sure: p = %.2g", c.p_value);
   text +=
-      Format("     how sure: p = %.2g; in the frames that chose it, chi2 falls by %.0f ± %.0f\n",
-             c.p_value, c.gain.sum, c.gain.sigma);
+      Format("; in the frames that chose it, chi2 falls by %.0f ± %.0f", c.gain.sum, c.gain.sigma);
+  if (c.gain.sum < 2.0 * c.gain.sigma && !c.tried_anyway) {
+    const Gain expected = c.ExpectedGain();
+    text += Format(" (they are half of the evidence; %.0f ± %.0f expected)", expected.sum,
+                   expected.sigma);
+  }
+  text += "\n";
   text += Format(
       "     unseen frames: rms %.*f -> %.*f %s, chi2/dof %.3f -> %.3f, chi2 falls by "
       "%.0f ± %.0f\n",

@@ -35,6 +35,11 @@ struct CandidateResult {
   // Fall of chi2 in the choice share by one step in the fit share; by the refit, if `refitted`.
   Gain gain;
   bool refitted = false;
+  // Of a right effect with this statistic, which is of both shares: half of it, with the noise of a
+  // gain, 2 sqrt(gain).
+  Gain ExpectedGain() const;
+  bool tried_anyway =
+      false;             // since the model without it had run away; its score says nothing then
   std::string rejected;  // why not, empty if it could be chosen
   std::vector<EffectParameter> parameter_info;
   Eigen::VectorXd estimate, sigma;  // of the refit, else of the score test

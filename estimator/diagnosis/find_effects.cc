@@ -48,10 +48,13 @@ class Loop {
       : in_(in),
         options_(options),
         progress_(progress),
-        input_(MakeEstimationInput(*in.recording, SelectPairs(*in.recording, kLongestGap))),
+        input_(MakeEstimationInput(*in.recording, SelectPairs(*in.recording))),
         shares_(MakeShares(*in.recording, input_)) {
+    const PairSelection near = SelectPairs(*in.recording, kNearGap);
+    map_pairs_ = MakeShares(*in.recording, MakeEstimationInput(*in.recording, near)).choice;
     Thin(kMostFitPairs, &shares_.fit);
     Thin(kMostChoicePairs, &shares_.choice);
+    Thin(kMostChoicePairs, &map_pairs_);
   }
 
   Result<Calibration> Run(Diagnosis* out) {
@@ -113,9 +116,11 @@ class Loop {
  private:
   // Of recordings with pixels. A fit needs no more to tell effects apart: what it gets wrong within
   // its noise is projected out of the test. Time is spent on the refits.
-  static constexpr int kLongestGap = 3;  // what comes and goes within frames is to be seen
+  static constexpr int kNearGap =
+      3;  // of the maps: what comes and goes within frames is to be seen
   static constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
-  static constexpr double kOverwhelming = 1e-5;
+  static constexpr double kOverwhelming = 1e-5;  // all candidates together
+  static constexpr double kNoiseAlone = 2.0;     // inflation
   static constexpr double kStrongMisfit = 0.02;  // gain of one effect over chi2
 
   // Leaves every n-th pair, so that at most `most` stay.
@@ -173,25 +178,19 @@ class Loop {
       candidate.first = present + set->size();
       set->Add(candidate.entry, candidate.shape, candidate.effect);
     }
-    const StructureMaps maps(setup, model.bias_gyro_rad_s);
-    const int first_map = present + set->size();
-    auto with_maps = std::make_shared<EffectSet>(*set);
-    for (const auto& item : maps.set()->items()) {
-      with_maps->Add(item.entry, item.shape, item.effect);
-    }
-    const Scores mapped = ScoresOf(shares_.choice, model, with_maps, noise);
-    const Scores choice = FirstColumns(mapped, first_map);
+    const Scores choice = ScoresOf(shares_.choice, model, set, noise);
     const Scores fit = ScoresOf(shares_.fit, model, set, noise);
-    const Eigen::VectorXd prior = PriorInformation(in_.prior, model.effects.get(), *with_maps);
-    const Eigen::VectorXd fit_prior = prior.head(first_map);
-    last_maps_ = maps.Evaluate(mapped, first_map, prior);
+    const Eigen::VectorXd prior = PriorInformation(in_.prior, model.effects.get(), *set);
+    const StructureMaps maps(setup, model.bias_gyro_rad_s);
+    last_maps_ = maps.Evaluate(ScoresOf(map_pairs_, model, maps.set(), noise), present,
+                               PriorInformation(in_.prior, model.effects.get(), *maps.set()));
     result->before = result->after =
         Summarise(ScoresOf(shares_.report, model, nullptr, noise), noise);
 
     // Of each share by the other's step, by block; halved, to compare with a refit's gain in one.
     const auto gain_of_step = [&](const std::vector<int>& columns) {
-      std::vector<double> gain = GainOfStep(choice, StepOf(fit, columns, fit_prior));
-      const std::vector<double> other = GainOfStep(fit, StepOf(choice, columns, fit_prior));
+      std::vector<double> gain = GainOfStep(choice, StepOf(fit, columns, prior));
+      const std::vector<double> other = GainOfStep(fit, StepOf(choice, columns, prior));
       gain.insert(gain.end(), other.begin(), other.end());
       for (double& g : gain) g *= 0.5;
       return gain;
@@ -200,16 +199,21 @@ class Loop {
     // Significance by both shares: what was fitted is projected out of the scores, which makes
     // those of the fit's own frames as good as unseen ones.
     const Scores both = MergeShares(fit, choice);
+    std::vector<ScoreTest> alone;
+    for (const Candidate& candidate : candidates) {
+      alone.push_back(TestColumns(both, candidate.columns(), prior));
+    }
+    const Scatter usual = UsualScatter(alone);
     std::vector<std::pair<CandidateResult, Candidate>> all;
     for (const Candidate& candidate : candidates) {
-      const ScoreTest test = TestColumns(both, candidate.columns(), fit_prior);
+      const ScoreTest test = TestColumns(both, candidate.columns(), prior, usual);
       std::vector<double> gain = gain_of_step(candidate.columns());
       for (size_t i = 0; i < gain.size(); ++i) gain[i] -= without[i];
       all.emplace_back(MakeResult(candidate, test, SumOf(gain)), candidate);
-      all.back().first.start = StepOf(fit, candidate.columns(), fit_prior)
+      all.back().first.start = StepOf(fit, candidate.columns(), prior)
                                    .segment(candidate.first, candidate.effect->size());
     }
-    AddStepCandidate(setup, both, fit_prior, &all);
+    AddStepCandidate(setup, both, prior, usual, &all);
     AddTurnCandidate(setup, choice, &all);
 
     // Significance, all candidates together, and a gain beyond its own noise.
@@ -234,25 +238,28 @@ class Loop {
     return added;
   }
 
-  // A gain beyond its noise: beyond twice its scatter from block to block or, where the
-  // effect acts in some blocks only (a step early in the recording) so that the scatter is the
-  // effect itself, beyond twice the noise that the gain of a right effect has, 2 sqrt(gain),
-  // inflated as the test; a right effect then makes hardly any block worse. Where both shares
-  // together leave no doubt, once its scatter is enough, or the half of the data that tells the
-  // gain only has to agree: with its sign, with half of the statistic, which is what a right effect
-  // gains there, and with a scatter that is not beyond twice a right effect's (structure that lacks
-  // a name has more).
+  // Of an effect that is significant: does the gain in unseen frames bear it out?
+  // It does if it is beyond twice its scatter from block to block or, where the effect acts in some
+  // blocks only (a step early in the recording) so that the scatter is the effect itself, beyond
+  // twice the noise that the gain of a right effect has, 2 sqrt(gain), inflated as the test; a
+  // right effect then makes hardly any block worse.
+  // The half of the data that tells the gain cannot have it beyond its noise for an effect of less
+  // than some 8 sigmas. Where the noise is what the model says (little inflation), or both shares
+  // together leave no doubt, it only has to agree: with its sign (before the refit, where both
+  // shares tell the gain), with half of the statistic, which is what a right effect gains there,
+  // and with a scatter that is not beyond twice a right effect's (structure that lacks a name has
+  // more). Without any doubt, once its scatter is enough.
   static bool IsSure(const CandidateResult& r, double tests) {
     const Gain& gain = r.gain;
     const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, r.inflation));
     if (gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum)) {
       return true;
     }
-    if (r.p_value * tests > kOverwhelming) return false;
-    const double expected = 0.5 * r.statistic * r.inflation;
-    const double of_expected = 2.0 * std::sqrt(expected * r.inflation);
-    return gain.sum > gain.sigma || (gain.sum > 0.0 && gain.sum + 2.0 * of_expected > expected &&
-                                     gain.sigma < 2.0 * of_expected);
+    const bool no_doubt = r.p_value * tests < kOverwhelming;
+    const Gain expected = r.ExpectedGain();
+    return (no_doubt && gain.sum > gain.sigma) ||
+           ((no_doubt || r.inflation < kNoiseAlone) && (r.refitted || gain.sum > 0.0) &&
+            gain.sum + 2.0 * expected.sigma > expected.sum && gain.sigma < 2.0 * expected.sigma);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -274,9 +281,10 @@ class Loop {
   }
 
   void AddStepCandidate(const EffectSetup& setup, const Scores& both, const Eigen::VectorXd& prior,
+                        const Scatter& usual,
                         std::vector<std::pair<CandidateResult, Candidate>>* all) const {
     const EffectEntry* entry = FindEffect("delay_step");
-    const StepSearch found = SearchDelayStep(both, prior, 1.5 * shares_.block_s);
+    const StepSearch found = SearchDelayStep(both, prior, 1.5 * shares_.block_s, usual);
     if (found.test.dof == 0) return;
     char shape[40];
     // Between two frames: a step shows from its first frame on.
@@ -332,7 +340,10 @@ class Loop {
     for (size_t i = 0; i < all->size(); ++i) {
       auto& [r, candidate] = (*all)[i];
       const bool in_any_case = astray && r.name == "radial_distortion";
-      if (in_any_case) r.rejected.clear();
+      if (in_any_case && !r.rejected.empty()) {
+        r.tried_anyway = true;
+        r.rejected.clear();
+      }
       if (!r.rejected.empty()) continue;
       if (candidate.effect->turn_sigma_rad_s() > 0.0) {
         // It frees three numbers per pair, whose gain the likelihood ratio has discounted: that one
@@ -474,11 +485,19 @@ class Loop {
   const Progress& progress_;
   const EstimationInput input_;
   Shares shares_;
+  std::vector<PairBlock> map_pairs_;  // the choice share's frames in pairs that are near
   Refined fit_;
   std::vector<StructureMap> last_maps_;
 };
 
 }  // namespace
+
+Gain CandidateResult::ExpectedGain() const {
+  Gain expected;
+  expected.sum = 0.5 * statistic * inflation;
+  expected.sigma = 2.0 * std::sqrt(expected.sum * inflation);
+  return expected;
+}
 
 Result<Calibration> FindEffects(const LoopInput& input, const DiagnoseOptions& options,
                                 const Progress& progress, Diagnosis* diagnosis) {

@@ -107,7 +107,7 @@ Effective Project(const Scores& scores, const std::vector<int>& columns,
   return e;
 }
 
-ScoreTest Judge(const Effective& e, const Eigen::VectorXd& prior) {
+ScoreTest Judge(const Effective& e, const Eigen::VectorXd& prior, const Scatter& usual) {
   ScoreTest test;
   // Directions with information beyond the prior's.
   const Eigen::VectorXd scale = prior.cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
@@ -143,14 +143,31 @@ ScoreTest Judge(const Effective& e, const Eigen::VectorXd& prior) {
   const double free = static_cast<double>(e.rest.size()) - 1.0;
   // Each direction took one degree of freedom from the sum of the blocks' rests.
   // (Columns that live in one block leave nothing there: for them the pairs count.)
-  test.inflation =
-      std::max({1.0, scatter / test.dof * (free + 1.0) / free, pair_scatter / test.dof});
+  test.scatter = {scatter / test.dof * (free + 1.0) / free, test.dof * free};
+  const double dof = test.scatter.dof + usual.dof;
+  const double moderated =
+      (test.scatter.variance * test.scatter.dof + usual.variance * usual.dof) / dof;
+  test.inflation = std::max({1.0, moderated, pair_scatter / test.dof});
   test.statistic = chi2 / test.inflation;
-  test.p_value = FTail(test.statistic / test.dof, test.dof, test.dof * free);
+  test.p_value = FTail(test.statistic / test.dof, test.dof, dof);
   Eigen::MatrixXd with_prior = e.M / test.inflation;
   with_prior.diagonal() += prior;
   test.covariance = with_prior.inverse();
   return test;
+}
+
+// Of the delay's score between blocks, once the model and a step (a column) are fitted. The scores
+// of the step's own column say little of a step near an end: few blocks have it.
+Scatter DelayScatter(const Scores& scores, int step, Eigen::VectorXd prior_information) {
+  prior_information[step] = 0.0;  // a prior leaves some of a step
+  const Eigen::VectorXd fitted = StepOf(scores, {step}, prior_information);
+  double scatter = 0.0;
+  for (const BlockScore& block : scores.blocks) {
+    const double left = block.g[kStateDelay] + block.H.row(kStateDelay).dot(fitted);
+    scatter += left * left / std::max(1e-30, block.H(kStateDelay, kStateDelay));
+  }
+  const double free = static_cast<double>(scores.blocks.size()) - 2.0;  // delay and step
+  return {scatter / free, free};
 }
 
 }  // namespace
@@ -212,9 +229,37 @@ double FTail(double value, double dof1, double dof2) {
 }
 
 ScoreTest TestColumns(const Scores& scores, const std::vector<int>& columns,
-                      const Eigen::VectorXd& prior_information) {
+                      const Eigen::VectorXd& prior_information, const Scatter& usual) {
   if (scores.blocks.size() < 4) return {};
-  return Judge(Project(scores, columns, prior_information), Pick(prior_information, columns));
+  return Judge(Project(scores, columns, prior_information), Pick(prior_information, columns),
+               usual);
+}
+
+Scatter UsualScatter(const std::vector<ScoreTest>& tests) {
+  constexpr double kMostDof = 50.0;
+  const auto digamma = [](double x) { return Eigen::numext::digamma(x); };
+  const auto trigamma = [](double x) { return Eigen::numext::polygamma(1.0, x); };
+  // log of a variance, without what the finite degrees of freedom shift it by
+  std::vector<double> logs;
+  double own_variance = 0.0;
+  for (const ScoreTest& test : tests) {
+    if (test.dof == 0 || test.scatter.variance <= 0.0) continue;
+    const double half = 0.5 * test.scatter.dof;
+    logs.push_back(std::log(test.scatter.variance) - digamma(half) + std::log(half));
+    own_variance += trigamma(half);
+  }
+  if (logs.size() < 3) return {};
+  const auto n = static_cast<double>(logs.size());
+  const double mean = std::accumulate(logs.begin(), logs.end(), 0.0) / n;
+  double variance = -own_variance / n;
+  for (const double log : logs) variance += (log - mean) * (log - mean) / (n - 1.0);
+  // trigamma falls from infinity to zero: its inverse by bisection
+  double low = 0.01, high = 0.5 * kMostDof;
+  for (int i = 0; i < 60; ++i) {
+    const double half = 0.5 * (low + high);
+    (trigamma(half) > variance ? low : high) = half;
+  }
+  return {std::exp(mean + digamma(high) - std::log(high)), 2.0 * high};
 }
 
 Eigen::VectorXd StepOf(const Scores& scores, const std::vector<int>& columns,
@@ -252,7 +297,7 @@ std::vector<double> GainOfStep(const Scores& scores, const Eigen::VectorXd& step
 }
 
 StepSearch SearchDelayStep(const Scores& scores, const Eigen::VectorXd& prior_information,
-                           double margin_s) {
+                           double margin_s, const Scatter& usual) {
   StepSearch best;
   if (scores.blocks.size() < 4 || scores.pairs.empty()) return best;
   // A column for the step: the delay's own, for the pairs after it.
@@ -272,6 +317,7 @@ StepSearch SearchDelayStep(const Scores& scores, const Eigen::VectorXd& prior_in
   const double first_s = scores.pairs.front().time_s, last_s = scores.pairs.back().time_s;
   double first_used_s = last_s, last_used_s = first_s;
   double best_chi2 = 0.0;  // before inflation, which changes with the time of the step
+  Scores stepped;
   for (size_t i = scores.pairs.size(); i-- > 0;) {
     const PairScore& pair = scores.pairs[i];
     BlockScore& block = extended.blocks[static_cast<size_t>(pair.block)];
@@ -282,15 +328,23 @@ StepSearch SearchDelayStep(const Scores& scores, const Eigen::VectorXd& prior_in
     if (pair.time_s < first_s + margin_s || pair.time_s > last_s - margin_s) continue;
     first_used_s = std::min(first_used_s, pair.time_s);
     last_used_s = std::max(last_used_s, pair.time_s);
-    const ScoreTest test = TestColumns(extended, {static_cast<int>(n)}, prior);
+    const ScoreTest test = TestColumns(extended, {static_cast<int>(n)}, prior, usual);
     if (test.dof == 1 && test.statistic * test.inflation > best_chi2) {
       best_chi2 = test.statistic * test.inflation;
       best.test = test;
       best.time_s = pair.time_s;
       best.frame = pair.frame_b;
+      stepped.num_model = extended.num_model;
+      stepped.blocks = extended.blocks;
     }
   }
   if (best.test.dof == 1 && last_used_s > first_used_s) {
+    const Scatter scatter = DelayScatter(stepped, static_cast<int>(n), prior);
+    const double dof = scatter.dof + usual.dof;
+    best.test.inflation = std::max(
+        best.test.inflation, (scatter.variance * scatter.dof + usual.variance * usual.dof) / dof);
+    best.test.statistic = best_chi2 / best.test.inflation;
+    best.test.p_value = FTail(best.test.statistic, 1.0, dof);
     const double duration = last_s - first_s;
     const double e1 = (first_used_s - first_s) / duration, e2 = (last_s - last_used_s) / duration;
     const double log_lambda = std::log((1.0 - e1) * (1.0 - e2) / std::max(1e-6, e1 * e2));

@@ -15,6 +15,12 @@ Scores FirstColumns(Scores scores, Eigen::Index columns);
 // independently.
 Scores MergeShares(const Scores& first, const Scores& second);
 
+// Variance of the scores between blocks over what the noise lets expect, and how many degrees of
+// freedom that knowledge is worth.
+struct Scatter {
+  double variance = 1.0, dof = 0.0;
+};
+
 // Score (Lagrange multiplier) test of some columns, the model's own columns projected out.
 struct ScoreTest {
   // chi-square of the columns over the inflation; F-distributed times `dof` under the model.
@@ -24,14 +30,21 @@ struct ScoreTest {
   // Variance of the scores between blocks over what the noise lets expect, at least 1: what
   // correlation within a block, outliers and unmodelled jitter make of it.
   double inflation = 1.0;
+  Scatter scatter;           // of these columns alone
   Eigen::VectorXd estimate;  // one Gauss-Newton step from zero
   Eigen::MatrixXd covariance;
 };
 
 // `columns`: indices into BlockScore::g. prior_information: of the model's columns (1 / sigma^2 of
-// their priors), and of the tested ones.
+// their priors), and of the tested ones. usual: what the inflation is expected to be; a recording
+// has a dozen or two of blocks, which alone leave the tail of F too heavy to tell small effects.
 ScoreTest TestColumns(const Scores& scores, const std::vector<int>& columns,
-                      const Eigen::VectorXd& prior_information);
+                      const Eigen::VectorXd& prior_information, const Scatter& usual = {});
+
+// What the scatters of many tests on the same blocks have in common (Smyth, "Linear models and
+// empirical Bayes methods", 2004, section 6.2: log variances that differ by more than their own
+// degrees of freedom allow are worth less). dof is at most 50, since the tests are not independent.
+Scatter UsualScatter(const std::vector<ScoreTest>& tests);
 
 // Change of all columns by one Gauss-Newton step with some columns free beside the model's; the
 // others stay zero.
@@ -56,7 +69,7 @@ struct StepSearch {
 };
 // margin_s: from either end. Returns dof 0 if there are too few pairs.
 StepSearch SearchDelayStep(const Scores& scores, const Eigen::VectorXd& prior_information,
-                           double margin_s);
+                           double margin_s, const Scatter& usual = {});
 
 // The delay of each pair on its own: more scatter than noise? statistic: chi2 over dof pairs, after
 // division by `inflation`, the same scatter of what has no time in it (the focal length), at

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "core/time.h"
+
 namespace camgyro {
 namespace {
 
@@ -31,8 +33,10 @@ void DropTracks(const std::vector<TrackedPoint>& a, const std::vector<TrackedPoi
 Shares MakeShares(const Recording& recording, const EstimationInput& input) {
   Shares shares;
   if (input.pairs.empty()) return shares;
-  const double begin_s = input.pairs.front().time_a_s;
-  const double duration_s = input.pairs.back().time_b_s - begin_s;
+  // Of the frames, so that pairs of any gap have the same blocks.
+  const double begin_s = SecondsSince(input.origin_ns, recording.frames.front().stamp_ns);
+  const double duration_s =
+      SecondsSince(input.origin_ns, recording.frames.back().stamp_ns) - begin_s;
   shares.block_s =
       std::max(std::clamp(duration_s / 40.0, 0.2, 3.0), 6.0 * MedianInterval(recording.frames));
   const auto block_of = [&](double time_s) {
