@@ -137,7 +137,7 @@ def plot_over_axis(results, name, map_name, parts, scale, labels, file):
         return
     data = maps(result, map_name)
     figure, axes = plt.subplots(1, len(parts), figsize=(3.4 * len(parts), 3), sharey=True,
-                                squeeze=False)
+                                layout="constrained", squeeze=False)
     for axis, part in zip(axes[0], parts):
         for when, colour, shape in (("before", BEFORE, "o--"), ("after", AFTER, "s-")):
             points = []
@@ -154,7 +154,6 @@ def plot_over_axis(results, name, map_name, parts, scale, labels, file):
     axes[0][0].set_ylabel(labels[1])
     axes[0][0].legend(frameon=False)
     figure.suptitle("%s: %s" % (name, map_name))
-    figure.tight_layout()
     figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
     plt.close(figure)
 
@@ -165,7 +164,7 @@ def plot_image(results, name, file):
         return
     data = maps(result, "shift over the image")
     width, height = result["calibration"]["camera"]["resolution"]
-    figure, axes = plt.subplots(1, 2, figsize=(8, 3.2), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(8, 3.2), sharey=True, layout="constrained")
     longest = 1e-9
     fields = {}
     for when in ("before", "after"):
@@ -190,7 +189,6 @@ def plot_image(results, name, file):
         axis.set_xlabel("u [px]")
     axes[0].set_ylabel("v [px]")
     figure.suptitle(name + ": shift over the image that the model lacks")
-    figure.tight_layout()
     figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
     plt.close(figure)
 
@@ -216,7 +214,7 @@ def plot_lens(results, file):
     shifted = xi + np.cos(angle)
     sphere = fy * np.sin(angle) / (alpha * np.hypot(np.sin(angle), shifted) +
                                    (1 - alpha) * shifted)
-    figure, axis = plt.subplots(figsize=(6, 3))
+    figure, axis = plt.subplots(figsize=(6, 3), layout="constrained")
     said = []
     for profile, colour, label in ((radtan, BEFORE, "published, radtan"),
                                    (found, AFTER, "found, kannala_brandt")):
@@ -230,7 +228,6 @@ def plot_lens(results, file):
     axis.set_ylabel("radius, less that of\nBasalt's double sphere [px]")
     axis.legend(frameon=False)
     figure.suptitle("euroc-v101-flight: two calibrations against a third")
-    figure.tight_layout()
     figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
     plt.close(figure)
     return "Against Basalt's double sphere calibration of euroc's camera: %s.\n" % "; ".join(said)

@@ -370,9 +370,20 @@ def main():
             results[key_of(row)] = row
             with open(store + ".new", "w", encoding="utf-8") as out:
                 for key in sorted(results):
-                    out.write(json.dumps(results[key]) + "\n")
+                    out.write(json.dumps(rounded(results[key])) + "\n")
             os.replace(store + ".new", store)
     write(options, list(results.values()))
+
+
+def rounded(value):
+    """To four digits, all numbers in a row."""
+    if isinstance(value, float):
+        return float("%.4g" % value)
+    if isinstance(value, list):
+        return [rounded(item) for item in value]
+    if isinstance(value, dict):
+        return {key: rounded(item) for key, item in value.items()}
+    return value
 
 
 def key_of(row):
