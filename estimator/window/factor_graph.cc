@@ -214,7 +214,7 @@ SolveReport FactorGraph::Solve(const SolveOptions& options) {
       report.message = "no convergence";
       const double expected =
           0.5 * (added.dot(step.cwiseAbs2()) - now->gradient.dot(step));  // fall of the cost
-      if (expected <= options.function_tolerance * now->cost) {
+      if (expected <= std::min(options.function_tolerance * now->cost, options.cost_tolerance)) {
         report.message = "convergence";
         break;
       }

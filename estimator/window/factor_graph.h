@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -52,8 +53,11 @@ struct Factor {
 
 struct SolveOptions {
   int max_iterations = 10;
-  // Stops when the next step would lower the cost by less than this fraction of it.
+  // Stops when the next step would lower the cost by less than this fraction of it,
   double function_tolerance = 1e-6;
+  // and by less than this: a cost that falls by 0.5 moves an estimate by a sigma, however many
+  // factors there are.
+  double cost_tolerance = std::numeric_limits<double>::infinity();
 };
 
 struct SolveReport {

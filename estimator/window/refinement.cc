@@ -74,6 +74,9 @@ class FitSum {
   int inliers_ = 0, matches_ = 0;
 };
 
+// A tenth of a sigma. Robust weights and strong correlations (f and k1) make steps fall short.
+constexpr double kCostTolerance = 0.005;
+
 }  // namespace
 
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
@@ -134,7 +137,7 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     // Every round searches the directions anew: with the calibration of the round before, another
     // minimum may be the right one (little parallax has several).
     if (!rotations && result.rounds > 1) all_residuals(/*search=*/true);
-    const SolveReport report = graph->Solve({15, 1e-5});
+    const SolveReport report = graph->Solve({30, 1e-5, kCostTolerance});
     if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
     const auto residuals = all_residuals(/*search=*/false);

@@ -1,6 +1,7 @@
 // Marginalisation in the graph: windows against batches, rotations at their optimum, odd blocks.
 #include "estimator/window/factor_graph.h"
 
+#include <ceres/sized_cost_function.h>
 #include <gmock/gmock.h>
 
 #include <Eigen/Dense>
@@ -33,6 +34,31 @@ std::vector<FactorGraph::FactorKey> AllKeys(const FactorGraph& graph) {
   std::vector<FactorGraph::FactorKey> keys;
   for (const auto& entry : graph.factors()) keys.push_back(entry.first);
   return keys;
+}
+
+// A residual that nothing changes, as the noise of many matches, beside one of a parameter.
+class LargeAndSmall : public ceres::SizedCostFunction<2, 1> {
+ public:
+  bool Evaluate(const double* const* x, double* residuals, double** jacobians) const override {
+    residuals[0] = 2000.0;
+    residuals[1] = x[0][0] - 3.0;
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      jacobians[0][0] = 0.0;
+      jacobians[0][1] = 1.0;
+    }
+    return true;
+  }
+};
+
+// Three sigmas off, which lower the cost by two millionths.
+TEST(FactorGraph, TheNumberOfFactorsDoesNotDecideWhenAParameterHasSettled) {
+  FactorGraph graph;
+  graph.AddBlock(Bias(0), Euclidean(VectorXd::Zero(1)));
+  graph.AddFactor(std::make_shared<LargeAndSmall>(), {Bias(0)});
+  ASSERT_TRUE(graph.Solve({10, 1e-5}).usable);
+  EXPECT_EQ(graph.value(Bias(0))[0], 0.0);
+  ASSERT_TRUE(graph.Solve({10, 1e-5, 0.005}).usable);
+  EXPECT_NEAR(graph.value(Bias(0))[0], 3.0, 0.1);
 }
 
 // Every tangent coordinate of every block as a functional.
