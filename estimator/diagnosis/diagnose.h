@@ -32,14 +32,15 @@ struct CandidateResult {
   double statistic = 0.0;  // chi-square over its inflation
   double p_value = 1.0;    // of this candidate alone
   double inflation = 1.0;
-  // Fall of chi2 in the choice share by one step in the fit share; by the refit, if `refitted`.
+  // Fall of chi2 in one share by one step in the other (mean of both ways); in the choice share by
+  // the refit, if `refitted`.
   Gain gain;
   bool refitted = false;
   // Of a right effect with this statistic, which is of both shares: half of it, with the noise of a
   // gain, 2 sqrt(gain).
   Gain ExpectedGain() const;
-  bool tried_anyway =
-      false;             // since the model without it had run away; its score says nothing then
+  // Since the model without it had run away; its score says nothing then.
+  bool tried_anyway = false;
   std::string rejected;  // why not, empty if it could be chosen
   std::vector<EffectParameter> parameter_info;
   Eigen::VectorXd estimate, sigma;  // of the refit, else of the score test

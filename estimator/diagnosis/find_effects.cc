@@ -7,6 +7,7 @@
 #include "core/so3.h"
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/diagnose.h"
+#include "estimator/diagnosis/gain_rule.h"
 #include "estimator/window/pair_view.h"
 
 namespace camgyro {
@@ -114,13 +115,11 @@ class Loop {
   }
 
  private:
+  // Of the maps: what comes and goes within some frames is to be seen.
+  static constexpr int kNearGap = 3;
   // Of recordings with pixels. A fit needs no more to tell effects apart: what it gets wrong within
   // its noise is projected out of the test. Time is spent on the refits.
-  static constexpr int kNearGap =
-      3;  // of the maps: what comes and goes within frames is to be seen
   static constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
-  static constexpr double kOverwhelming = 1e-5;  // all candidates together
-  static constexpr double kNoiseAlone = 2.0;     // inflation
   static constexpr double kStrongMisfit = 0.02;  // gain of one effect over chi2
 
   // Leaves every n-th pair, so that at most `most` stay.
@@ -221,7 +220,7 @@ class Loop {
     for (auto& [r, candidate] : all) {
       if (r.p_value * tests > options_.significance) {
         r.rejected = "not significant";
-      } else if (!IsSure(r, tests)) {
+      } else if (!GainBearsOut(r, tests)) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
     }
@@ -236,30 +235,6 @@ class Loop {
     }
     for (auto& entry : all) result->candidates.push_back(std::move(entry.first));
     return added;
-  }
-
-  // Of an effect that is significant: does the gain in unseen frames bear it out?
-  // It does if it is beyond twice its scatter from block to block or, where the effect acts in some
-  // blocks only (a step early in the recording) so that the scatter is the effect itself, beyond
-  // twice the noise that the gain of a right effect has, 2 sqrt(gain), inflated as the test; a
-  // right effect then makes hardly any block worse.
-  // The half of the data that tells the gain cannot have it beyond its noise for an effect of less
-  // than some 8 sigmas. Where the noise is what the model says (little inflation), or both shares
-  // together leave no doubt, it only has to agree: with its sign (before the refit, where both
-  // shares tell the gain), with half of the statistic, which is what a right effect gains there,
-  // and with a scatter that is not beyond twice a right effect's (structure that lacks a name has
-  // more). Without any doubt, once its scatter is enough.
-  static bool IsSure(const CandidateResult& r, double tests) {
-    const Gain& gain = r.gain;
-    const double noise = 2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, r.inflation));
-    if (gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum)) {
-      return true;
-    }
-    const bool no_doubt = r.p_value * tests < kOverwhelming;
-    const Gain expected = r.ExpectedGain();
-    return (no_doubt && gain.sum > gain.sigma) ||
-           ((no_doubt || r.inflation < kNoiseAlone) && (r.refitted || gain.sum > 0.0) &&
-            gain.sum + 2.0 * expected.sigma > expected.sum && gain.sigma < 2.0 * expected.sigma);
   }
 
   CandidateResult MakeResult(const Candidate& candidate, const ScoreTest& test,
@@ -405,7 +380,7 @@ class Loop {
           r.rejected = p.name + " outside of what real devices show";
         }
       }
-      if (r.rejected.empty() && !IsSure(r, static_cast<double>(all->size()))) {
+      if (r.rejected.empty() && !GainBearsOut(r, static_cast<double>(all->size()))) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
       if (r.rejected.empty() &&
@@ -491,13 +466,6 @@ class Loop {
 };
 
 }  // namespace
-
-Gain CandidateResult::ExpectedGain() const {
-  Gain expected;
-  expected.sum = 0.5 * statistic * inflation;
-  expected.sigma = 2.0 * std::sqrt(expected.sum * inflation);
-  return expected;
-}
 
 Result<Calibration> FindEffects(const LoopInput& input, const DiagnoseOptions& options,
                                 const Progress& progress, Diagnosis* diagnosis) {

@@ -181,8 +181,8 @@ TEST(ScoreTest, FindsTheTimeOfAStepOfTheDelay) {
     pair.g.head(kStateSize) -= change;
     scores.blocks[static_cast<size_t>(pair.block)].g.head(kStateSize) -= change;
   }
-  const StepSearch found = SearchDelayStep(scores, Prior(), 1.0);
-  EXPECT_LT(found.test.p_value, 1e-3);  // of twelve blocks
+  const StepSearch found = SearchDelayStep(scores, Prior(), 1.0, {1.0, 50.0});
+  EXPECT_LT(found.test.p_value, 1e-4);
   EXPECT_NEAR(found.time_s, 7.25, 0.5);
   EXPECT_NEAR(found.test.estimate[0], 0.4, 0.1);
 }
