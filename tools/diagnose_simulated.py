@@ -2,8 +2,9 @@
 """Diagnoses simulated recordings and writes docs/diagnosis_simulated.md: every effect, undeclared;
 two effects at once; clean recordings, on which nothing may be named.
 
-    tools/diagnose_simulated.py [--seeds A-B] [--duration S] [--pairs A-B] [--clean A-B]
-                                [--clean_duration S] [--jobs N] [--camgyro PATH] [--write]
+    tools/diagnose_simulated.py [--seeds A-B] [--effects NAME,...] [--duration S] [--pairs A-B]
+                                [--clean A-B] [--clean_duration S] [--jobs N] [--camgyro PATH]
+                                [--write]
 
 Every run becomes a line of docs/diagnosis_simulated.jsonl, with the commit of the sources; a later
 run of the same case takes its place. The document is made of all lines, so that a long series can
@@ -12,6 +13,7 @@ be run in parts (all of it takes hours): --seeds 1-3 now, --seeds 4-10 later, --
 `calibrate` with the effect declared ("informed"), in the shape that the diagnosis found, if it did.
 """
 import argparse
+import copy
 import glob
 import itertools
 import json
@@ -32,6 +34,7 @@ NOT_FITTED = ("electronic_stabilisation", "gyro_saturation", "readout_direction"
 # A walk turns with less than 1 rad/s, so that nothing saturates.
 ABSENT = (("gyro_saturation", "walking"),)
 MOTIONS = ("walking", "running")
+MARGIN_S = 0.5  # of the gyro before the first frame, a scenario's margin_s
 
 
 def read(path):
@@ -57,6 +60,21 @@ def errors(calibration, truth):
     return (np.append(np.subtract(parts(calibration, "value"), parts(truth, "value")), rotation),
             np.append(parts(calibration, "sigma"),
                       calibration["extrinsics"]["q_gyro_cam_wxyz"]["sigma_rad"]))
+
+
+def as_fitted(truth, duration_s):
+    """The truth, with what the effects are said to shift: a gyro's filter delays by its time
+    constant, which is part of t_d; the bias is that of the middle if it drifts."""
+    truth = copy.deepcopy(truth)
+    values = {e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
+              for e in truth["effects"]}
+    delay = truth["clock"]["delay_s"]
+    delay["value"] += values.get("gyro_lowpass", {}).get("time_constant", 0.0)
+    if "bias_drift" in values:
+        bias = truth["gyro"]["bias_rad_s"]
+        bias["value"] = [b + values["bias_drift"]["rate_" + axis] * (
+            0.5 * duration_s + MARGIN_S) for axis, b in zip("xyz", bias["value"])]
+    return truth
 
 
 def true_parameters(truth, effect):
@@ -150,8 +168,8 @@ def run(options, case):
             subprocess.run([options.camgyro, "calibrate", recording, "--effects", declared,
                             "--out", informed, "--quiet"], capture_output=True, check=False)
         if os.path.exists(informed + "/calibration.yaml"):
-            reference, truth = read(informed + "/calibration.yaml"), read(recording +
-                                                                          "/truth.yaml")
+            reference = read(informed + "/calibration.yaml")
+            truth = as_fitted(read(recording + "/truth.yaml"), options.duration)
             sizes = [max((abs(p["value"]) / p["sigma"] for p in e["parameters"] if p["sigma"] > 0),
                          default=None) for e in reference.get("effects", [])]
             result["size"] = None if None in sizes or not sizes else min(sizes)
@@ -173,7 +191,8 @@ def effect_cases(options):
     # One seed after the other, so that a series that is cut off has all effects.
     scenarios = sorted(glob.glob(SOURCE + "/tools/scenarios/effect_*.yaml"))
     for seed, scenario, motion in itertools.product(options.seeds, scenarios, MOTIONS):
-        if (name_of(scenario), motion) not in ABSENT:
+        wanted = not options.effects or name_of(scenario) in options.effects
+        if wanted and (name_of(scenario), motion) not in ABSENT:
             yield dict(kind="effects", name=name_of(scenario), motion=motion, seed=seed,
                        effects=[effect_of(scenario)],
                        scenario=[scenario, "seed=%d" % seed, "duration_s=%g" % options.duration,
@@ -345,6 +364,7 @@ def commit_of_sources():
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=numbers, default="10")
+    parser.add_argument("--effects", type=lambda names: names.split(","))
     parser.add_argument("--duration", type=float, default=40.0)
     parser.add_argument("--pairs", type=numbers, default="20")
     parser.add_argument("--clean", type=numbers, default="200")
