@@ -106,17 +106,7 @@ std::string Joined(const std::vector<std::string>& words) {
 
 std::string RoundText(size_t number, const DiagnosisRound& round, const char* unit, double scale) {
   std::string text;
-  if (round.added.empty()) {
-    text = Format("%zu. nothing more is significant", number);
-    if (!round.candidates.empty()) {
-      const auto best =
-          std::min_element(round.candidates.begin(), round.candidates.end(),
-                           [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-      text += Format(" (of %zu candidates the nearest is %s, p = %.2g each)",
-                     round.candidates.size(), best->name.c_str(), best->p_value);
-    }
-    return text + "\n";
-  }
+  if (round.added.empty()) return Format("%zu. ", number) + NothingAddedText(round) + "\n";
   const CandidateResult& c = round.candidates.front();
   text = Format("%zu. %s%s: %s\n", number, c.name.c_str(),
                 c.shape == "constant" ? "" : (" (" + c.shape + ")").c_str(),
@@ -227,6 +217,19 @@ std::string ResidualMapsCsv(const Diagnosis& d) {
     }
   }
   return out.str();
+}
+
+std::string NothingAddedText(const DiagnosisRound& round) {
+  if (round.candidates.empty()) return "nothing more is significant";
+  const auto best =
+      std::min_element(round.candidates.begin(), round.candidates.end(),
+                       [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+  if (!best->rejected.empty() && best->rejected != "not significant") {
+    return Format("nothing more is added (%s is significant, p = %.2g, but: %s)",
+                  best->name.c_str(), best->p_value, best->rejected.c_str());
+  }
+  return Format("nothing more is significant (of %zu candidates the nearest is %s, p = %.2g each)",
+                round.candidates.size(), best->name.c_str(), best->p_value);
 }
 
 std::string DiagnosisText(const Diagnosis& d, bool attitudes) {

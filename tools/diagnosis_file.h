@@ -14,6 +14,9 @@ std::string DiagnosisYaml(const Diagnosis& diagnosis);
 // residual_maps.csv: every cell of every map, before and after the effects.
 std::string ResidualMapsCsv(const Diagnosis& diagnosis);
 
+// Of a round that has added nothing: what came nearest, and why it is not named.
+std::string NothingAddedText(const DiagnosisRound& round);
+
 // The account in the terminal: what was found, how sure, before and after, what to do.
 std::string DiagnosisText(const Diagnosis& diagnosis, bool attitudes);
 

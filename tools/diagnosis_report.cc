@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tools/diagnosis_file.h"
 #include "tools/report/calibrate_report.h"
 #include "tools/report/charts.h"
 #include "tools/report/page.h"
@@ -48,7 +49,7 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
   for (size_t i = 0; i < d.rounds.size(); ++i) {
     const DiagnosisRound& round = d.rounds[i];
     if (round.added.empty()) {
-      rounds.rows.push_back(Row({FormatText("%zu", i + 1), "nothing more is significant", "", "",
+      rounds.rows.push_back(Row({FormatText("%zu", i + 1), NothingAddedText(round), "", "",
                                  FormatText("%.3f", scale * round.before.rms_px),
                                  FormatText("%.3f", round.before.chi2), "", ""}));
       continue;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "estimator/diagnosis/step_time.h"
+
 namespace camgyro {
 namespace {
 
@@ -93,6 +95,10 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
     CalibrateOptions with = options.calibrate;
     with.given_start = report.start;
     with.from = *found;
+    // Once all frames may be seen, those of the report, too.
+    const EstimationInput all = MakeEstimationInput(recording, SelectPairs(recording));
+    PlaceDelaySteps(recording, all, all.pairs, 1.5 * diagnosis.block_s, input.noise, input.graph,
+                    &*with.from);
     with.online = false;
     const Result<CalibrationReport> after =
         CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));

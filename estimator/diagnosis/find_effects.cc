@@ -8,6 +8,7 @@
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/diagnose.h"
 #include "estimator/diagnosis/gain_rule.h"
+#include "estimator/diagnosis/step_time.h"
 #include "estimator/window/pair_view.h"
 
 namespace camgyro {
@@ -354,6 +355,12 @@ class Loop {
         const Result<Refined> other = Fit(anew, in_.noise);
         if (other && (!fit || FitChi2(*other) < FitChi2(*fit))) fit = other;
       }
+      if (fit && r.name == "delay_step" && PlaceSteps(&fit->calibration)) {
+        Calibration placed = fit->calibration;
+        placed.prior_sigma = in_.prior.prior_sigma;
+        r.shape = placed.effects->items().back().shape;
+        fit = Fit(placed, noise);
+      }
       if (fit) {
         fit = SettleEffects(*in_.recording, *std::move(fit), [this](Calibration from, double px) {
           from.prior_sigma = in_.prior.prior_sigma;
@@ -431,6 +438,15 @@ class Loop {
     std::rotate(all->begin(), all->begin() + static_cast<std::ptrdiff_t>(best.at),
                 all->begin() + static_cast<std::ptrdiff_t>(best.at) + 1);
     return true;
+  }
+
+  // The linear search of a step is right to within a pair, or a gap between the shares.
+  bool PlaceSteps(Calibration* calibration) const {
+    std::vector<TimedPair> pairs = Joined(shares_.fit);
+    const std::vector<TimedPair> choice = Joined(shares_.choice);
+    pairs.insert(pairs.end(), choice.begin(), choice.end());
+    return PlaceDelaySteps(*in_.recording, input_, pairs, 1.5 * shares_.block_s,
+                           fit_.quality.noise_px, in_.graph, calibration);
   }
 
   // Of the last effect's parameters being all zero, by their fit (Wald). The score extrapolates

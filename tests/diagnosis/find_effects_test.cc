@@ -91,8 +91,8 @@ TEST(FindEffects, NamesAStepEarlyInTheRecording) {
       Find(Simulate(10, {"duration_s=24", "effects.delay_step={time_s: 4, step_s: 0.012}"}));
   ASSERT_THAT(diagnosis.effects, testing::ElementsAre("delay_step"));
   const CandidateResult& found = diagnosis.rounds.front().candidates.front();
-  EXPECT_NEAR(found.estimate[0], 0.012, 5.0 * found.sigma[0]);
-  EXPECT_NEAR(std::stod(found.shape), 4.0, 1.2);  // on the gyro's clock, to a block
+  EXPECT_NEAR(found.estimate[0], 0.012, 3.0 * found.sigma[0]);
+  EXPECT_NEAR(std::stod(found.shape), 3.985, 0.1);  // the stamp of the first frame after
 }
 
 // A lens of 60 deg half the diagonal: the series of radtan does not converge there, so that the one

@@ -1,0 +1,37 @@
+#include <gmock/gmock.h>
+
+#include "tools/diagnosis_file.h"
+
+namespace camgyro {
+namespace {
+
+using testing::HasSubstr;
+
+CandidateResult Candidate(const std::string& name, double p_value, const std::string& rejected) {
+  CandidateResult candidate;
+  candidate.name = name;
+  candidate.p_value = p_value;
+  candidate.rejected = rejected;
+  return candidate;
+}
+
+TEST(DiagnosisText, SaysWhatCameNearest) {
+  DiagnosisRound round;
+  round.candidates = {Candidate("gyro_scale", 0.4, "not significant"),
+                      Candidate("aspect_ratio", 0.1, "not significant")};
+  EXPECT_THAT(NothingAddedText(round), HasSubstr("nothing more is significant"));
+  EXPECT_THAT(NothingAddedText(round), HasSubstr("of 2 candidates the nearest is aspect_ratio"));
+}
+
+TEST(DiagnosisText, SaysWhySomethingSignificantIsNotNamed) {
+  DiagnosisRound round;
+  round.candidates = {Candidate("gyro_scale", 0.4, "not significant"),
+                      Candidate("delay_step", 1.3e-9, "no gain on unseen frames")};
+  const std::string text = NothingAddedText(round);
+  EXPECT_THAT(text, HasSubstr("delay_step is significant, p = 1.3e-09"));
+  EXPECT_THAT(text, HasSubstr("no gain on unseen frames"));
+  EXPECT_THAT(text, Not(HasSubstr("nothing more is significant")));
+}
+
+}  // namespace
+}  // namespace camgyro
