@@ -90,6 +90,7 @@ struct EffectSetup {
   std::vector<double> gyro_times_s;       // after the first gyro stamp
   Eigen::Matrix3Xd gyro_rad_s;            // readings, one column per time
   double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
+  std::vector<double> frame_delays_s;     // of each frame with the effects on time; empty: delay_s
   Eigen::Matrix3d R_gyro_cam = Eigen::Matrix3d::Identity();
   bool has_pixels = true;                                     // false: attitudes
   DistortionModel distortion_model = DistortionModel::kNone;  // declared

@@ -17,8 +17,10 @@ class OpticalStabilisation final : public Effect {
   OpticalStabilisation(const EffectSetup& setup, double corner_hz)
       : Effect({{"shift_per_rad", "px/rad", 500.0, 30.0, 1e4}}),
         times_s_(setup.gyro_times_s),
-        delay_s_(setup.delay_s),
+        delays_s_(setup.frame_delays_s),
         readout_s_(setup.readout_s) {
+    for (const FrameTime& frame : setup.frames) stamps_s_.push_back(frame.stamp_s);
+    delays_s_.resize(stamps_s_.size(), setup.delay_s);
     const double a = 2.0 * M_PI * corner_hz;
     const auto n = static_cast<Eigen::Index>(times_s_.size());
     const Eigen::Vector3d mean = setup.gyro_rad_s.rowwise().mean();  // the bias, nearly
@@ -33,7 +35,10 @@ class OpticalStabilisation final : public Effect {
     }
   }
   void ChangeLens(const Observation& o, LensColumns columns) const override {
-    const double t = o.frame.stamp_s + delay_s_ + readout_s_ * o.px.y() / o.size_px.y();
+    const auto frame = std::lower_bound(stamps_s_.begin(), stamps_s_.end(), o.frame.stamp_s);
+    if (frame == stamps_s_.end()) return;
+    const double delay_s = delays_s_[static_cast<size_t>(frame - stamps_s_.begin())];
+    const double t = o.frame.stamp_s + delay_s + readout_s_ * o.px.y() / o.size_px.y();
     const auto next = std::lower_bound(times_s_.begin(), times_s_.end(), t);
     if (next == times_s_.begin() || next == times_s_.end()) return;
     const Eigen::Index i = next - times_s_.begin();
@@ -46,7 +51,8 @@ class OpticalStabilisation final : public Effect {
 
  private:
   const std::vector<double> times_s_;
-  const double delay_s_, readout_s_;
+  std::vector<double> stamps_s_, delays_s_;  // of the frames
+  const double readout_s_;
   Eigen::Matrix2Xd angle_;
 };
 

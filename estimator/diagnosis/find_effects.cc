@@ -274,6 +274,7 @@ class Loop {
     gain.sum = (found.test.statistic - 1.0) * inflation;
     gain.sigma = std::sqrt(2.0 + 4.0 * found.test.statistic) / 2.0 * inflation;
     all->emplace_back(MakeResult(candidate, found.test, gain), candidate);
+    all->back().first.start = found.test.estimate;
   }
 
   void AddTurnCandidate(const EffectSetup& setup, const Scores& choice,

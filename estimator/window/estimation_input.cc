@@ -100,6 +100,14 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   for (const Frame& frame : recording.frames) {
     setup.frames.push_back({SecondsSince(origin_ns, frame.stamp_ns), frame.exposure_s});
   }
+  if (const PairEffects effects = calibration.pair_effects(); effects.set != nullptr) {
+    EffectSet::Change change;
+    for (const FrameTime& frame : setup.frames) {
+      effects.set->ChangeObservation({0.5 * setup.size_px, setup.size_px, frame}, &change);
+      setup.frame_delays_s.push_back(calibration.delay_s +
+                                     change.time.row(0).dot(calibration.effect_values));
+    }
+  }
   setup.gyro_rad_s.resize(3, static_cast<Eigen::Index>(recording.gyro.size()));
   for (const GyroSample& sample : recording.gyro) {
     setup.gyro_rad_s.col(static_cast<Eigen::Index>(setup.gyro_times_s.size())) =

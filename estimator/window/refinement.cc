@@ -178,10 +178,13 @@ Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refi
   for (int i = 0; i < kMostTimes && RemakeEffects(recording, &fit.calibration); ++i) {
     Result<Refined> better = refit(fit.calibration, fit.quality.noise_px);
     if (!better) break;
-    const StateVector moved =
-        Difference(better->calibration, fit.calibration).cwiseQuotient(better->calibration.sigma());
+    const Calibration& c = better->calibration;
+    const StateVector moved = Difference(c, fit.calibration).cwiseQuotient(c.sigma());
+    const Eigen::VectorXd effects_moved =
+        (c.effect_values - fit.calibration.effect_values)
+            .cwiseQuotient(c.effect_covariance.diagonal().cwiseSqrt());
     fit = *std::move(better);
-    if (moved.cwiseAbs().maxCoeff() < 0.1) break;
+    if (std::max(moved.cwiseAbs().maxCoeff(), effects_moved.cwiseAbs().maxCoeff()) < 0.1) break;
   }
   return fit;
 }

@@ -76,6 +76,25 @@ TEST(CalibrateRecording, MakesEffectsAnewThatDependOnTheDelay) {
   EXPECT_LT(report->calibration.sigma()[kStateDelay], 5e-4);
 }
 
+// What the stabiliser does follows the time of the frame, whatever else shifts that.
+TEST(CalibrateRecording, MakesEffectsAnewThatDependOnEffectsOnTime) {
+  Scenario scenario = ShortScenario(12.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  scenario.effects.optical_stabilisation = {0.4, 0.5};
+  scenario.effects.delay_step = {5.0, 0.010};
+  const Simulated s = SimulateTracks(scenario).value();
+  CalibrateOptions options;
+  options.effects = "optical_stabilisation:0.5,delay_step:4.968";
+  const Result<CalibrationReport> report =
+      CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  const Calibration& c = report->calibration;
+  const double sigma = std::sqrt(c.effect_covariance(1, 1));
+  EXPECT_NEAR(c.effect_values[1], 0.010, 4.0 * sigma);
+  EXPECT_LT(sigma, 5e-4);
+  EXPECT_NEAR(c.delay_s, s.truth.delay_s, 4.0 * c.sigma()[kStateDelay]);
+}
+
 TEST(CalibrateRecording, RefusesARecordingThatDoesNotTurn) {
   Scenario scenario = ShortScenario(3.0);
   scenario.motion.rotation_rms_rad_s.setZero();
