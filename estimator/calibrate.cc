@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <future>
 
 #include "core/so3.h"
 
@@ -78,6 +79,49 @@ double HalvesChi2(const Calibration& first, const Calibration& second) {
 // The disagreement that right models exceed once in a thousand recordings: the 99.9 % quantile of
 // chi-square with 11 degrees of freedom is 31.3.
 constexpr double kHalvesLimit = 31.3 / kStateSize;
+
+struct Halves {
+  double chi2 = 0.0;  // HalvesChi2, 0 if a half cannot be fitted
+  std::optional<UnseenFit> unseen;
+};
+
+// Each half of the pairs is fitted alone, and the other one tells how well. The pairs across the
+// middle belong to neither, so that no frame is in both.
+Halves FitHalves(const EstimationInput& input, const Calibration& from, const Calibration& prior,
+                 const RefinementOptions& refinement) {
+  const auto middle = input.pairs.begin() + static_cast<std::ptrdiff_t>(input.pairs.size() / 2);
+  std::array<std::vector<TimedPair>, 2> halves;
+  halves[0].assign(input.pairs.begin(), middle);
+  for (auto pair = middle; pair != input.pairs.end(); ++pair) {
+    if (pair->time_a_s > halves[0].back().time_b_s) halves[1].push_back(*pair);
+  }
+  RefinementOptions options = refinement;
+  options.max_rounds = std::min(4, refinement.max_rounds);
+  options.cluster_s = 0.5 * refinement.cluster_s;
+  std::array<Calibration, 2> fits;
+  UnseenFit unseen;
+  bool both = true;
+  for (size_t h = 0; h < 2; ++h) {
+    const Result<Refined> half = Refine(input, halves[h], from, prior, options);
+    if (!half) {
+      both = false;
+      continue;
+    }
+    fits[h] = half->calibration;
+    if (halves[1 - h].empty() || halves[1 - h].front().matches.empty()) continue;  // attitudes
+    const UnseenFit other = EvaluateUnseen(input, halves[1 - h], half->calibration,
+                                           half->quality.noise_px, refinement.graph);
+    unseen.rms_px = std::sqrt((unseen.matches * unseen.rms_px * unseen.rms_px +
+                               other.matches * other.rms_px * other.rms_px) /
+                              std::max(1, unseen.matches + other.matches));
+    unseen.matches += other.matches;
+    unseen.pairs += other.pairs;
+  }
+  Halves result;
+  if (unseen.matches > 0) result.unseen = unseen;
+  if (both) result.chi2 = HalvesChi2(fits[0], fits[1]);
+  return result;
+}
 
 // A parameter is determined if the data shrank its prior and the result is of practical use.
 void MarkDetermined(bool attitudes, Calibration* c) {
@@ -297,44 +341,12 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
       from = SettleEffects(recording, *first, refine).calibration;
       from.prior_sigma = prior.prior_sigma;
     }
-    double halves_chi2 = 0.0;
+    // Beside the fit of all pairs, each half alone.
+    std::future<Halves> halves_fit;
     if (static_cast<int>(input.pairs.size()) >= kMinPairsForUnseen) {
-      // Each half is fitted alone, and the other one tells how well. The pairs across the
-      // middle belong to neither, so that no frame is in both.
-      const auto middle = input.pairs.begin() + static_cast<std::ptrdiff_t>(input.pairs.size() / 2);
-      std::array<std::vector<TimedPair>, 2> halves;
-      halves[0].assign(input.pairs.begin(), middle);
-      for (auto pair = middle; pair != input.pairs.end(); ++pair) {
-        if (pair->time_a_s > halves[0].back().time_b_s) halves[1].push_back(*pair);
-      }
-      std::array<Calibration, 2> fits;
-      RefinementOptions half_options = refinement;
-      half_options.max_rounds = std::min(4, refinement.max_rounds);
-      half_options.cluster_s = 0.5 * refinement.cluster_s;
-      UnseenFit unseen;
-      bool both = true;
-      for (size_t h = 0; h < 2; ++h) {
-        const Result<Refined> half = Refine(input, halves[h], from, prior, half_options);
-        if (!half) {
-          both = false;
-          continue;
-        }
-        fits[h] = half->calibration;
-        if (!attitudes) {
-          const UnseenFit other = EvaluateUnseen(input, halves[1 - h], half->calibration,
-                                                 half->quality.noise_px, refinement.graph);
-          unseen.rms_px = std::sqrt((unseen.matches * unseen.rms_px * unseen.rms_px +
-                                     other.matches * other.rms_px * other.rms_px) /
-                                    std::max(1, unseen.matches + other.matches));
-          unseen.matches += other.matches;
-          unseen.pairs += other.pairs;
-        }
-        tell("refinement", 0.3 * static_cast<double>(h + 1));
-      }
-      if (!attitudes && unseen.matches > 0) report.unseen = unseen;
-      if (both) halves_chi2 = HalvesChi2(fits[0], fits[1]);
+      halves_fit = std::async(std::launch::async, FitHalves, std::cref(input), std::cref(from),
+                              std::cref(prior), std::cref(refinement));
     }
-    tell("refinement", 0.6);
     Result<Refined> refined = Refine(input, input.pairs, from, prior, refinement);
     if (!refined && report.online) {  // a window that has run away, to a lens without rays
       refined = refine(from_start, options.refinement.graph.sigma_px);
@@ -345,15 +357,18 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     report.quality = refined->quality;
     report.skipped_pairs = refined->skipped_pairs;
     report.converged = refined->converged;
-    report.halves_chi2 = halves_chi2;
-    if (halves_chi2 > kHalvesLimit) {
-      report.calibration.covariance *= halves_chi2;
-      report.calibration.effect_covariance *= halves_chi2;
+    tell("refinement", 0.6);
+    const Halves halves = halves_fit.valid() ? halves_fit.get() : Halves();
+    report.unseen = halves.unseen;
+    report.halves_chi2 = halves.chi2;
+    if (halves.chi2 > kHalvesLimit) {
+      report.calibration.covariance *= halves.chi2;
+      report.calibration.effect_covariance *= halves.chi2;
       report.doubts.push_back(Format(
           "the two halves of the recording disagree beyond their noise (chi2 per parameter %.0f "
           "instead of 1): something moves that the model holds constant, or the scene is "
           "degenerate; all sigmas are multiplied by %.1f",
-          halves_chi2, std::sqrt(halves_chi2)));
+          halves.chi2, std::sqrt(halves.chi2)));
     }
     clock.Finish("refinement");
   } else {
