@@ -6,6 +6,8 @@
 #include <opencv2/video/tracking.hpp>
 #include <optional>
 
+#include "frontend/patch_alignment.h"
+
 namespace camgyro {
 namespace {
 
@@ -16,8 +18,10 @@ constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KL
 constexpr double kLeastVariance = 0.05;
 constexpr size_t kPointsForReference = 20;
 
-// Interpolation takes one pixel more than the patch.
-int Border(const TrackerOptions& options) { return options.window_px / 2 + 1; }
+// The patch, its derivatives and their interpolation.
+int Border(const TrackerOptions& options) {
+  return std::max(options.window_px, options.aligned_px) / 2 + 2;
+}
 
 bool Inside(const cv::Point2f& point, const cv::Size& size, int border) {
   const auto margin = static_cast<float>(border);
@@ -55,22 +59,6 @@ std::optional<cv::Mat> LikePrevious(const cv::Mat& gray, const std::vector<cv::M
   cv::Mat alike;
   gray.convertTo(alike, CV_8U, gain, offset);
   return alike;
-}
-
-// Inverse of the patch's mean structure tensor [px^2 per grey^2]: what KLT makes of grey noise, but
-// for a factor. derivatives: Scharr's, 32 times the gradient, as in OpenCV's pyramids.
-Eigen::Matrix2d InverseStructureTensor(const cv::Mat& derivatives, const cv::Point2f& point,
-                                       int window_px) {
-  const int half = window_px / 2, x = cvRound(point.x), y = cvRound(point.y);
-  Eigen::Matrix2d tensor = 1e-6 * Eigen::Matrix2d::Identity();
-  for (int v = std::max(0, y - half); v <= std::min(derivatives.rows - 1, y + half); ++v) {
-    const auto* row = derivatives.ptr<cv::Vec2s>(v);
-    for (int u = std::max(0, x - half); u <= std::min(derivatives.cols - 1, x + half); ++u) {
-      const Eigen::Vector2d gradient = Eigen::Vector2d(row[u][0], row[u][1]) / 32.0;
-      tensor += gradient * gradient.transpose() / (window_px * window_px);
-    }
-  }
-  return tensor.inverse();
 }
 
 }  // namespace
@@ -151,41 +139,55 @@ void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& p
           LikePrevious(gray, pyramid_, pyramid, points_, search.points, search.found)) {
     search = SearchPoints(Pyramid(*alike), start);
   }
+  // KLT has found where each patch went; how it turned and grew on the way decides the last
+  // hundredths of a pixel.
+  std::vector<std::optional<AlignedPatch>> aligned(points_.size());
+  cv::parallel_for_(cv::Range(0, static_cast<int>(points_.size())), [&](const cv::Range& range) {
+    for (auto i = static_cast<size_t>(range.start); i < static_cast<size_t>(range.end); ++i) {
+      if (!search.found[i]) continue;
+      const cv::Point2f &from = points_[i], &to = search.points[i];
+      aligned[i] =
+          AlignPatch(pyramid_[0], {from.x, from.y}, pyramid[0], {to.x, to.y}, options_.aligned_px);
+    }
+  });
 
   // Ids ascend, so of two points that have run into one the older stays.
   const double too_close_px = 0.5 * options_.min_distance_px;
   size_t kept = 0;
-  std::vector<Eigen::Matrix2d> shapes(points_.size());
+  std::vector<Eigen::Matrix2d> covariances;
   for (size_t i = 0; i < points_.size(); ++i) {
-    bool good = search.found[i];
-    for (size_t j = 0; j < kept && good; ++j) {
-      good = cv::norm(search.points[i] - points_[j]) >= too_close_px;
-    }
+    if (!aligned[i]) continue;
+    const cv::Point2f point(static_cast<float>(aligned[i]->px.x()),
+                            static_cast<float>(aligned[i]->px.y()));
+    bool good = true;
+    for (size_t j = 0; j < kept && good; ++j) good = cv::norm(point - points_[j]) >= too_close_px;
     if (!good) continue;
     ids_[kept] = ids_[i];
-    shapes[kept] = InverseStructureTensor(pyramid_[1], points_[i], options_.window_px);
-    points_[kept] = search.points[i];
+    points_[kept] = point;
+    covariances.push_back(aligned[i]->covariance);
     ++kept;
   }
   ids_.resize(kept);
   points_.resize(kept);
-  shapes.resize(kept);
-  noise_factors_ = NoiseFactors(shapes);
+  noise_factors_ = NoiseFactors(covariances);
 }
 
-std::vector<Eigen::Vector3d> KltTracker::NoiseFactors(const std::vector<Eigen::Matrix2d>& shapes) {
-  std::vector<Eigen::Vector3d> factors(shapes.size(), Eigen::Vector3d(1.0, 0.0, 1.0));
+std::vector<Eigen::Vector3d> KltTracker::NoiseFactors(
+    const std::vector<Eigen::Matrix2d>& covariances) {
+  std::vector<Eigen::Vector3d> factors(covariances.size(), Eigen::Vector3d(1.0, 0.0, 1.0));
   if (!(reference_ > 0.0)) {
-    if (shapes.size() < kPointsForReference) return factors;
+    if (covariances.size() < kPointsForReference) return factors;
     std::vector<double> variances;
-    for (const Eigen::Matrix2d& shape : shapes) variances.push_back(0.5 * shape.trace());
+    for (const Eigen::Matrix2d& covariance : covariances) {
+      variances.push_back(0.5 * covariance.trace());
+    }
     const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
     std::nth_element(variances.begin(), middle, variances.end());
     reference_ = *middle;
   }
-  for (size_t i = 0; i < shapes.size(); ++i) {
+  for (size_t i = 0; i < covariances.size(); ++i) {
     const Eigen::Matrix2d covariance =
-        shapes[i] / reference_ + kLeastVariance * Eigen::Matrix2d::Identity();
+        covariances[i] / reference_ + kLeastVariance * Eigen::Matrix2d::Identity();
     const Eigen::Matrix2d L = covariance.llt().matrixL();
     factors[i] << L(0, 0), L(1, 0), L(1, 1);
   }

@@ -11,51 +11,10 @@
 #include <random>
 #include <set>
 
+#include "tests/frontend/waves.h"
+
 namespace camgyro {
 namespace {
-
-// A scene without pixels, so that a moved picture of it is exact: a sum of plane waves, their
-// amplitude proportional to a power of their length; 1 is that of natural pictures (1/f).
-class Waves {
- public:
-  explicit Waves(unsigned seed, double power = 1.0) {
-    std::mt19937 generator(seed);
-    std::uniform_real_distribution<double> angle(0.0, 2.0 * M_PI);
-    std::uniform_real_distribution<double> log_length(std::log(8.0), std::log(400.0));
-    double variance = 0.0;
-    for (Wave& wave : waves_) {
-      const double direction = angle(generator), length_px = std::exp(log_length(generator));
-      const double k = 2.0 * M_PI / length_px;
-      const double amplitude = std::pow(length_px, power);
-      wave = {amplitude, k * std::cos(direction), k * std::sin(direction), angle(generator)};
-      variance += 0.5 * amplitude * amplitude;
-    }
-    for (Wave& wave : waves_) wave.amplitude *= 50.0 / std::sqrt(variance);
-  }
-
-  // Picture of w x h px that shows at pixel p the scene point R(turn) p - shift.
-  cv::Mat Render(int w, int h, const Eigen::Vector2d& shift, double turn_rad = 0.0) const {
-    cv::Mat image(h, w, CV_8U);
-    const double c = std::cos(turn_rad), s = std::sin(turn_rad);
-    for (int v = 0; v < h; ++v) {
-      for (int u = 0; u < w; ++u) {
-        const double x = c * u - s * v - shift.x(), y = s * u + c * v - shift.y();
-        double sum = 128.0;
-        for (const Wave& wave : waves_) {
-          sum += wave.amplitude * std::cos(wave.kx * x + wave.ky * y + wave.phase);
-        }
-        image.at<uchar>(v, u) = cv::saturate_cast<uchar>(sum);
-      }
-    }
-    return image;
-  }
-
- private:
-  struct Wave {
-    double amplitude, kx, ky, phase;
-  };
-  std::array<Wave, 60> waves_;
-};
 
 std::map<int64_t, Eigen::Vector2d> ById(const std::vector<TrackedPoint>& points) {
   std::map<int64_t, Eigen::Vector2d> by_id;
@@ -109,6 +68,32 @@ TEST(KltTracker, FollowsSubPixelMotion) {
   // Rounding to 8 bits is all the noise there is: sqrt(1/12) levels against gradients of tens.
   EXPECT_LT(std::sqrt(sum_sq / count), 0.025);
   EXPECT_LT(worst, 0.1);
+}
+
+// A patch that turns would be found beside its place, towards where its texture is, each time.
+TEST(KltTracker, TurningDoesNotMoveAPoint) {
+  const Waves scene(1, 0.0);
+  KltTracker tracker(SmallImageOptions());
+  const double turn_rad = 0.03;
+  const Eigen::Vector2d middle(0.5 * kWidth, 0.5 * kHeight);
+  std::map<int64_t, Eigen::Vector2d> before;
+  double sum_sq = 0.0;
+  int count = 0;
+  for (int frame = 0; frame <= 5; ++frame) {
+    const Eigen::Rotation2Dd turn(frame * turn_rad);
+    const auto now =
+        ById(tracker.Add(scene.Render(kWidth, kHeight, turn * middle - middle, turn.angle())));
+    for (const auto& [id, px] : now) {
+      const auto it = before.find(id);
+      if (it == before.end()) continue;
+      const Eigen::Vector2d truth = Eigen::Rotation2Dd(-turn_rad) * (it->second - middle) + middle;
+      sum_sq += (px - truth).squaredNorm();
+      ++count;
+    }
+    before = now;
+  }
+  ASSERT_GT(count, 200);
+  EXPECT_LT(std::sqrt(sum_sq / count), 0.02);
 }
 
 TEST(KltTracker, IdsAscendAndAreNeverReused) {
