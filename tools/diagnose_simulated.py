@@ -28,38 +28,19 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 import numpy as np
 import yaml
 
+from calibration_errors import errors
+
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # They end in a refusal or in words, not in parameters that a fit could be given.
 NOT_FITTED = ("electronic_stabilisation", "gyro_saturation", "readout_direction")
 # A walk turns with less than 1 rad/s, so that nothing saturates.
 ABSENT = (("gyro_saturation", "walking"),)
 MOTIONS = ("walking", "running")
-MARGIN_S = 0.5  # of the gyro before the first frame, a scenario's margin_s
 
 
 def read(path):
     with open(path, encoding="utf-8") as file:
         return yaml.safe_load(file)
-
-
-def multiply(a, b):
-    (w, x, y, z), (p, q, r, s) = a, b
-    return np.array([w * p - x * q - y * r - z * s, w * q + x * p + y * s - z * r,
-                     w * r - x * s + y * p + z * q, w * s + x * r - y * q + z * p])
-
-
-def errors(calibration, truth):
-    """Errors of f, c, t_r, t_d, b_g, q_c (3) and their sigmas."""
-    def parts(c, key):
-        return [c["camera"]["focal_px"][key], *c["camera"]["principal_px"][key],
-                c["shutter"]["readout_s"][key], c["clock"]["delay_s"][key],
-                *c["gyro"]["bias_rad_s"][key]]
-    inverse = np.array(truth["extrinsics"]["q_gyro_cam_wxyz"]["value"]) * [1, -1, -1, -1]
-    rotation = multiply(inverse, calibration["extrinsics"]["q_gyro_cam_wxyz"]["value"])
-    rotation = 2 * rotation[1:] * np.sign(rotation[0])
-    return (np.append(np.subtract(parts(calibration, "value"), parts(truth, "value")), rotation),
-            np.append(parts(calibration, "sigma"),
-                      calibration["extrinsics"]["q_gyro_cam_wxyz"]["sigma_rad"]))
 
 
 def as_fitted(truth, duration_s):
@@ -72,8 +53,9 @@ def as_fitted(truth, duration_s):
     delay["value"] += values.get("gyro_lowpass", {}).get("time_constant", 0.0)
     if "bias_drift" in values:
         bias = truth["gyro"]["bias_rad_s"]
+        margin_s = read(SOURCE + "/tools/scenarios/default.yaml")["margin_s"]
         bias["value"] = [b + values["bias_drift"]["rate_" + axis] * (
-            0.5 * duration_s + MARGIN_S) for axis, b in zip("xyz", bias["value"])]
+            0.5 * duration_s + margin_s) for axis, b in zip("xyz", bias["value"])]
     return truth
 
 

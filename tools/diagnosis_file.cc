@@ -224,7 +224,7 @@ std::string NothingAddedText(const DiagnosisRound& round) {
   const auto best =
       std::min_element(round.candidates.begin(), round.candidates.end(),
                        [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-  if (!best->rejected.empty() && best->rejected != "not significant") {
+  if (best->significant && !best->rejected.empty()) {
     return Format("nothing more is added (%s is significant, p = %.2g, but: %s)",
                   best->name.c_str(), best->p_value, best->rejected.c_str());
   }

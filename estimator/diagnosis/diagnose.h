@@ -29,8 +29,9 @@ struct DiagnoseOptions {
 struct CandidateResult {
   std::string name, shape;
   int parameters = 0;
-  double statistic = 0.0;  // chi-square over its inflation
-  double p_value = 1.0;    // of this candidate alone
+  double statistic = 0.0;    // chi-square over its inflation
+  double p_value = 1.0;      // of this candidate alone
+  bool significant = false;  // by the score test, all candidates of the round together
   double inflation = 1.0;
   // Fall of chi2 in one share by one step in the other (mean of both ways); in the choice share by
   // the refit, if `refitted`.

@@ -219,7 +219,8 @@ class Loop {
     // Significance, all candidates together, and a gain beyond its own noise.
     const double tests = static_cast<double>(all.size());
     for (auto& [r, candidate] : all) {
-      if (r.p_value * tests > options_.significance) {
+      r.significant = r.p_value * tests <= options_.significance;
+      if (!r.significant) {
         r.rejected = "not significant";
       } else if (!GainBearsOut(r, tests)) {
         r.rejected = "no gain on unseen frames beyond its noise";

@@ -11,6 +11,7 @@ CandidateResult Candidate(const std::string& name, double p_value, const std::st
   CandidateResult candidate;
   candidate.name = name;
   candidate.p_value = p_value;
+  candidate.significant = p_value < 1e-3;
   candidate.rejected = rejected;
   return candidate;
 }
