@@ -18,11 +18,11 @@ from calibration_errors import NAMES, errors
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # Scenario and what differs from its file.
-RUNS = ([("video_room", ["seed=%d" % seed]) for seed in range(1, 7)] +
+RUNS = ([("video_room", ["seed=%d" % seed]) for seed in (1, 2)] +
         [("video_room", ["seed=%d" % seed, "camera.readout_s=-0.016", "camera.delay_s=0.031"])
-         for seed in (3, 7)] +
+         for seed in (3,)] +
         [("video_street", ["seed=%d" % seed, "effects.radial_distortion={}"])
-         for seed in range(1, 5)])
+         for seed in (1, 2)])
 # What is asked for; a line of the table.
 LIMITS = ("limit", "0.3", "0.5", "0.5", "0.15", "", "")
 
