@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/step_time.h"
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -28,9 +29,10 @@ Calibration WithShape(const EffectSetup& setup, Calibration calibration, size_t 
   return calibration;
 }
 
+// Rounded down: after the last frame there is no step, and no effect could be made of it.
 std::string ShapeAt(double time_s) {
   char shape[40];
-  std::snprintf(shape, sizeof shape, "%.4f", time_s);
+  std::snprintf(shape, sizeof shape, "%.4f", std::floor(1e4 * time_s) * 1e-4);
   return shape;
 }
 

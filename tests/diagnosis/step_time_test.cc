@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "core/effects/catalogue.h"
 #include "tools/simulation/simulate.h"
 
@@ -70,6 +72,20 @@ TEST_F(StepTime, IsInTheMiddleOfFramesThatNoPairHas) {
     if (pair.time_a_s > 5.0) first_after_s = std::min(first_after_s, pair.time_a_s);
   }
   EXPECT_NEAR(Place(pairs, "5.1"), 0.5 * (last_before_s + first_after_s), 0.04);
+}
+
+// The shape has four decimals; a step after the last frame is none.
+TEST_F(StepTime, MayEndWithAFrameWhoseStampRoundsUp) {
+  const auto last_s = [&] {
+    return MakeEffectSetup(recording_, calibration_).frames.back().stamp_s;
+  };
+  while (std::fmod(1e4 * last_s(), 1.0) < 0.6) {
+    recording_.frames.pop_back();
+    recording_.tracks.pop_back();
+  }
+  ASSERT_GT(last_s(), 9.0);
+  input_ = MakeEstimationInput(recording_, SelectPairs(recording_));
+  EXPECT_NEAR(Place(input_.pairs, "5.6"), 0.5 * (before_s_ + after_s_), 0.06);
 }
 
 }  // namespace
