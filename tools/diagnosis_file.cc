@@ -113,7 +113,7 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
                 FindEffect(c.name)->explanation.c_str());
   if (c.estimate.size() > 0) text += "     " + ValueText(c) + "\n";
   text += c.tried_anyway
-              ? "     how sure: without it the fit runs away, so that its score says nothing"
+              ? "     how sure: without it the model is so far off that its score says nothing"
               : Format("     how sure: p = %.2g", c.p_value);
   text +=
       Format("; in the frames that chose it, chi2 falls by %.0f ± %.0f", c.gain.sum, c.gain.sigma);

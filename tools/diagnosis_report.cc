@@ -65,7 +65,7 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
     rounds.rows.push_back(
         Row({FormatText("%zu", i + 1),
              c.name + " (" + c.shape + "): " + FindEffect(c.name)->explanation, parameters,
-             c.tried_anyway ? "the fit runs away without it" : FormatText("%.2g", c.p_value),
+             c.tried_anyway ? "without it, the model is far off" : FormatText("%.2g", c.p_value),
              FormatText("%.3f → %.3f", scale * round.before.rms_px, scale * round.after.rms_px),
              FormatText("%.3f → %.3f", round.before.chi2, round.after.chi2),
              FormatText("%.0f ± %.0f", round.report_gain.sum, round.report_gain.sigma),

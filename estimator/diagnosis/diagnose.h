@@ -40,12 +40,14 @@ struct CandidateResult {
   // Of a right effect with this statistic, which is of both shares: half of it, with the noise of a
   // gain, 2 sqrt(gain).
   Gain ExpectedGain() const;
-  // Since the model without it had run away; its score says nothing then.
+  // Although its score is not significant or gains nothing: where the model is far off, it says
+  // little.
   bool tried_anyway = false;
   std::string rejected;  // why not, empty if it could be chosen
   std::vector<EffectParameter> parameter_info;
   Eigen::VectorXd estimate, sigma;  // of the refit, else of the score test
   Eigen::VectorXd start;            // one step in the fit share: where a refit begins
+  double start_delay_change_s = 0.0;
 };
 
 // How frames that neither fit nor choice has seen fit, all with the same noise.

@@ -2,7 +2,7 @@
 // choose by unseen gain, report on frames that neither has seen.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <iterator>
 
 #include "core/so3.h"
 #include "estimator/diagnosis/candidates.h"
@@ -148,6 +148,9 @@ class Loop {
       // Its chi2 depends on the noise model to some percent: it must be larger by half.
       return map.statistic > 1.5 * map.dof && map.p_value < 1e-6;
     }
+    // Noise changes with what is seen: up to 3.5 where nothing else is wrong (iphone-cards). Wrong
+    // by more than the loss is 8.
+    if (map.name == "misfit over time" && map.statistic < 4.0) return false;
     return map.p_value * tests < 0.1 * options_.significance;
   }
 
@@ -214,6 +217,7 @@ class Loop {
                                    .segment(candidate.first, candidate.effect->size());
     }
     AddStepCandidate(setup, both, prior, usual, &all);
+    if (DelayMoves()) ReplaceByLargeStep(setup, &all);
     AddTurnCandidate(setup, choice, &all);
 
     // Significance, all candidates together, and a gain beyond its own noise.
@@ -232,7 +236,8 @@ class Loop {
     });
     bool added = false;
     if (may_add && !all.empty() &&
-        (all.front().first.rejected.empty() || (round == 0 && HasRunAway(fit_.calibration)))) {
+        (all.front().first.rejected.empty() || DelayMoves() ||
+         (round == 0 && HasRunAway(fit_.calibration)))) {
       added = Contest(round, choice, noise, &all, result);
     }
     for (auto& entry : all) result->candidates.push_back(std::move(entry.first));
@@ -263,9 +268,8 @@ class Loop {
     const EffectEntry* entry = FindEffect("delay_step");
     const StepSearch found = SearchDelayStep(both, prior, 1.5 * shares_.block_s, usual);
     if (found.test.dof == 0) return;
-    char shape[40];
     // Between two frames: a step shows from its first frame on.
-    std::snprintf(shape, sizeof shape, "%.4f", found.time_s - 1e-3);
+    const std::string shape = DelayStepShape(found.time_s - 1e-3);
     Candidate candidate{entry, shape, entry->make(setup, shape), 0};
     if (candidate.effect == nullptr) return;
     // The gain on unseen frames is known by refit only. Here, what the statistic lets expect, in
@@ -276,6 +280,31 @@ class Loop {
     gain.sigma = std::sqrt(2.0 + 4.0 * found.test.statistic) / 2.0 * inflation;
     all->emplace_back(MakeResult(candidate, found.test, gain), candidate);
     all->back().first.start = found.test.estimate;
+  }
+
+  // In place of the linear search's step one that explains a good part of a misfit that comes and
+  // goes, if there is one.
+  void ReplaceByLargeStep(const EffectSetup& setup,
+                          std::vector<std::pair<CandidateResult, Candidate>>* all) const {
+    constexpr double kGoodPart = 0.3;
+    std::vector<PairBlock> blocks;
+    for (const auto* share : {&shares_.fit, &shares_.choice}) {
+      std::copy_if(share->begin(), share->end(), std::back_inserter(blocks),
+                   [](const PairBlock& block) { return !block.empty(); });
+    }
+    std::sort(blocks.begin(), blocks.end(), [](const PairBlock& a, const PairBlock& b) {
+      return a.front().time_a_s < b.front().time_a_s;
+    });
+    const auto found =
+        FindLargeStep(input_, blocks, fit_.calibration, fit_.quality.noise_px, in_.graph);
+    if (!found || found->explained < kGoodPart) return;
+    for (auto& [r, candidate] : *all) {
+      if (r.name != "delay_step") continue;
+      candidate.shape = r.shape = DelayStepShape(found->time_s);
+      candidate.effect = candidate.entry->make(setup, r.shape);
+      r.start = Eigen::VectorXd::Constant(1, found->step_s);
+      r.start_delay_change_s = found->delay_s - fit_.calibration.delay_s;
+    }
   }
 
   void AddTurnCandidate(const EffectSetup& setup, const Scores& choice,
@@ -310,14 +339,18 @@ class Loop {
       std::vector<double> gain;
     };
     std::vector<Rival> rivals;
-    const double best_gain = all->front().first.gain.sum;
+    const CandidateResult& front = all->front().first;
+    const double best_gain = front.rejected.empty() ? front.gain.sum : 0.0;
     // Far from where the model belongs, a linear gain says little: then a distorting lens, which
-    // throws the plain model off most, is tried in any case, and from where it all began.
+    // throws the plain model off most, is tried in any case, and from where it all began. So is a
+    // step of a delay that moves: where it leaves most matches beyond the loss, their scores
+    // scatter, or are nothing.
     const bool astray =
         round == 0 && (best_gain > kStrongMisfit * Chi2Of(choice) || HasRunAway(fit_.calibration));
     for (size_t i = 0; i < all->size(); ++i) {
       auto& [r, candidate] = (*all)[i];
-      const bool in_any_case = astray && r.name == "radial_distortion";
+      const bool in_any_case =
+          (astray && r.name == "radial_distortion") || (DelayMoves() && r.name == "delay_step");
       if (in_any_case && !r.rejected.empty()) {
         r.tried_anyway = true;
         r.rejected.clear();
@@ -348,6 +381,7 @@ class Loop {
       AddEffect(candidate, &start);
       const int columns = candidate.effect->size();
       if (r.start.size() == columns) start.effect_values.tail(columns) = r.start;
+      start.delay_s += r.start_delay_change_s;
       start.prior_sigma = in_.prior.prior_sigma;
       Result<Refined> fit = Fit(start, noise);
       if (astray) {
@@ -461,6 +495,14 @@ class Loop {
         calibration.effect_covariance.block(item.first, item.first, n, n);
     const double statistic = value.dot(covariance.completeOrthogonalDecomposition().solve(value));
     return ChiSquareTail(statistic / std::max(1.0, inflation), n);
+  }
+
+  bool DelayMoves() const {
+    return std::any_of(last_maps_.begin(), last_maps_.end(), [this](const StructureMap& map) {
+      // To try is cheap, and a walk loses less than a run.
+      return (map.name == "delay over time" && IsStructure(map)) ||
+             (map.name == "misfit over time" && map.statistic > 2.0 && map.p_value < 1e-3);
+    });
   }
 
   // Focal length 15 % or centre 5 % of the diagonal from where it all began.

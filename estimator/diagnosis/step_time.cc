@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/step_time.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -7,6 +8,7 @@
 #include <string>
 
 #include "core/effects/catalogue.h"
+#include "core/robust_statistics.h"
 #include "estimator/diagnosis/pair_scores.h"
 
 namespace camgyro {
@@ -29,13 +31,6 @@ Calibration WithShape(const EffectSetup& setup, Calibration calibration, size_t 
   return calibration;
 }
 
-// Rounded down: after the last frame there is no step, and no effect could be made of it.
-std::string ShapeAt(double time_s) {
-  char shape[40];
-  std::snprintf(shape, sizeof shape, "%.4f", std::floor(1e4 * time_s) * 1e-4);
-  return shape;
-}
-
 // Of a pair: chi2 with the step after it, between its frames, and before it.
 struct PairCosts {
   double time_a_s, time_b_s;
@@ -47,6 +42,12 @@ struct PairCosts {
 };
 
 }  // namespace
+
+std::string DelayStepShape(double time_s) {
+  char shape[40];
+  std::snprintf(shape, sizeof shape, "%.4f", std::floor(1e4 * time_s) * 1e-4);
+  return shape;
+}
 
 bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
                      const std::vector<TimedPair>& pairs, double reach_s, double noise,
@@ -65,7 +66,7 @@ bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
     }
     if (times_s.empty()) continue;
     const auto chi2 = [&](const TimedPair& pair, double step_s) {
-      const Calibration with = WithShape(setup, *calibration, k, ShapeAt(step_s));
+      const Calibration with = WithShape(setup, *calibration, k, DelayStepShape(step_s));
       const Scores scores = ComputeScores(input, {{pair}}, with, nullptr, noise, options);
       return scores.pairs.empty() ? 0.0 : scores.pairs.front().chi2;
     };
@@ -89,12 +90,110 @@ bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
         last = i;
       }
     }
-    const std::string shape = ShapeAt(times_s[(first + last) / 2]);
+    const std::string shape = DelayStepShape(times_s[(first + last) / 2]);
     if (shape == item.shape) continue;
     *calibration = WithShape(setup, std::move(*calibration), k, shape);
     moved = true;
   }
   return moved;
+}
+
+namespace {
+
+constexpr double kScanS = 0.1, kScanStepS = 2e-3;
+constexpr int kScanHalf = static_cast<int>(kScanS / kScanStepS + 0.5);
+constexpr int kDelays = 2 * kScanHalf + 1;
+constexpr size_t kPairsOfBlock = 3;
+
+// A noise for which the minima of chi2 are as wide as the steps of the scan.
+double ScanNoise(const std::vector<PairBlock>& blocks, double noise) {
+  std::vector<double> speeds;  // of matches [px/s] or of attitudes [rad/s]
+  for (const PairBlock& block : blocks) {
+    for (const TimedPair& pair : block) {
+      const double gap_s = pair.time_b_s - pair.time_a_s;
+      if (pair.matches.empty()) {
+        speeds.push_back(pair.rotation.q_a_b.angularDistance(Eigen::Quaterniond::Identity()) /
+                         gap_s);
+      }
+      for (const Match& match : pair.matches) {
+        speeds.push_back((match.px_b - match.px_a).norm() / gap_s);
+      }
+    }
+  }
+  return speeds.empty() ? noise : std::max(noise, 0.5 * kScanStepS * MedianInPlace(&speeds));
+}
+
+struct BlockCosts {
+  double begin_s = 0.0, end_s = 0.0;
+  int residuals = 0;
+  double at[kDelays] = {};  // chi2 with each delay
+  double now() const { return at[kScanHalf]; }
+};
+
+}  // namespace
+
+std::optional<LargeStep> FindLargeStep(const EstimationInput& input,
+                                       const std::vector<PairBlock>& blocks,
+                                       const Calibration& calibration, double noise,
+                                       const PairGraphOptions& options) {
+  const double scan_noise = ScanNoise(blocks, noise);
+  std::vector<BlockCosts> costs;
+  for (const PairBlock& block : blocks) {
+    BlockCosts cost;
+    const size_t stride = (block.size() + kPairsOfBlock - 1) / kPairsOfBlock;
+    for (size_t i = 0; i < block.size(); i += stride) {
+      const auto scores_at = [&](double delay_s) {
+        Calibration with = calibration;
+        with.delay_s = delay_s;
+        return ComputeScores(input, {{block[i]}}, with, nullptr, scan_noise, options);
+      };
+      const Scores now = scores_at(calibration.delay_s);
+      if (now.pairs.empty()) continue;
+      cost.residuals += now.pairs.front().residuals;
+      for (int k = 0; k < kDelays; ++k) {
+        const Scores scores = scores_at(calibration.delay_s + (k - kScanHalf) * kScanStepS);
+        // Where the gyro's samples end, a delay says nothing.
+        cost.at[k] += (scores.pairs.empty() ? now : scores).pairs.front().chi2;
+      }
+    }
+    if (cost.residuals == 0) continue;
+    cost.begin_s = block.front().time_a_s;
+    cost.end_s = block.back().time_b_s;
+    costs.push_back(cost);
+  }
+  if (costs.size() < 4) return std::nullopt;
+  std::vector<double> misfits;
+  for (const BlockCosts& block : costs) misfits.push_back(block.now() / block.residuals);
+  std::sort(misfits.begin(), misfits.end());
+  const double good = misfits[misfits.size() / 4];
+  double excess = 0.0;
+  for (const BlockCosts& block : costs) {
+    excess += std::max(0.0, block.now() - good * block.residuals);
+  }
+  LargeStep best;
+  double most = 0.0;
+  for (size_t border = 1; border < costs.size(); ++border) {
+    double before[kDelays] = {}, after[kDelays] = {};
+    for (size_t b = 0; b < costs.size(); ++b) {
+      for (int k = 0; k < kDelays; ++k) {
+        (b < border ? before : after)[k] += costs[b].now() - costs[b].at[k];
+      }
+    }
+    for (int k = 0; k < kDelays; ++k) {
+      const double change_s = (k - kScanHalf) * kScanStepS;
+      const double time_s = 0.5 * (costs[border - 1].end_s + costs[border].begin_s);
+      if (before[k] > most) {
+        most = before[k];
+        best = {time_s, calibration.delay_s + change_s, -change_s, most / excess};
+      }
+      if (after[k] > most) {
+        most = after[k];
+        best = {time_s, calibration.delay_s, change_s, most / excess};
+      }
+    }
+  }
+  if (!(most > 0.0) || !(excess > 0.0)) return std::nullopt;
+  return best;
 }
 
 }  // namespace camgyro

@@ -99,6 +99,39 @@ std::vector<double> EvenMiddles(double low, double high, int bins) {
   return middles;
 }
 
+// chi2 per residual, block by block, against that of the blocks that fit well (the lower quartile).
+// Where the model is so far off that the loss takes everything for outliers, nothing else shows.
+StructureMap MisfitOverTime(const Scores& scores) {
+  constexpr double kOverdispersion = 4.0;  // wrong matches come in flocks
+  StructureMap map;
+  map.name = "misfit over time";
+  map.unit = "chi2/dof";
+  map.axis_unit = "time [s]";
+  std::vector<double> values, sigmas;
+  for (const BlockScore& block : scores.blocks) {
+    if (block.residuals < 1) continue;
+    map.axis.push_back(block.time_s);
+    values.push_back(block.chi2 / block.residuals);
+    sigmas.push_back(std::sqrt(2.0 * kOverdispersion / block.residuals));
+  }
+  const auto n = static_cast<Eigen::Index>(values.size());
+  map.shape = {static_cast<int>(n)};
+  map.value = Eigen::Map<const Eigen::VectorXd>(values.data(), n);
+  map.sigma = Eigen::Map<const Eigen::VectorXd>(sigmas.data(), n).cwiseProduct(map.value);
+  if (n < 4) return map;
+  map.dof = static_cast<int>(n);
+  map.inflation = kOverdispersion;
+  std::sort(values.begin(), values.end());
+  const double good = values[values.size() / 4];
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double sigma = sigmas[static_cast<size_t>(i)];
+    const double z = (map.value[i] / good - 1.0) / sigma;
+    map.statistic = std::max(map.statistic, map.value[i] / good);
+    map.p_value = std::min(map.p_value, static_cast<double>(n) * ChiSquareTail(z * std::abs(z), 1));
+  }
+  return map;
+}
+
 }  // namespace
 
 StructureMaps::StructureMaps(const EffectSetup& setup, const Eigen::Vector3d& bias_rad_s)
@@ -276,6 +309,7 @@ std::vector<StructureMap> StructureMaps::Evaluate(const Scores& scores, int firs
     maps[m].p_value = test.p_value;
     maps[m].inflation = test.inflation;
   }
+  if (!scores.blocks.empty()) maps.push_back(MisfitOverTime(scores));
   // The delay frame by frame: one value per pair, whose scatter is compared with its noise.
   if (!scores.pairs.empty()) {
     const ScoreTest test = TestDelayOfPairs(scores, prior_information);

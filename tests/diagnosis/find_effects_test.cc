@@ -95,6 +95,27 @@ TEST(FindEffects, NamesAStepEarlyInTheRecording) {
   EXPECT_NEAR(std::stod(found.shape), 3.985, 0.1);  // the stamp of the first frame after
 }
 
+// Running, so that 30 ms are far beyond the loss: the first sixth is outliers, without a score.
+TEST(FindEffects, NamesAStepThatIsBeyondTheLoss) {
+  const Diagnosis diagnosis = Find(Simulate(
+      1, {"duration_s=24", "motion.kind=running", "effects.delay_step={time_s: 4, step_s: 0.03}"}));
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("delay_step"));
+  const CandidateResult& found = diagnosis.rounds.front().candidates.front();
+  EXPECT_NEAR(found.estimate[0], 0.03, 4.0 * found.sigma[0]);
+  EXPECT_NEAR(std::stod(found.shape), 3.95, 0.07);
+  EXPECT_TRUE(found.tried_anyway);
+}
+
+// There and back is no step, and a robust fit does not see it.
+TEST(FindEffects, SaysThatAStretchDoesNotFit) {
+  Recording recording = Simulate(1, {"duration_s=24", "motion.kind=running"});
+  for (size_t i = 400; i < 500; ++i) recording.frames[i].stamp_ns += 30'000'000;
+  const Diagnosis diagnosis = Find(recording);
+  EXPECT_THAT(diagnosis.effects, testing::IsEmpty());
+  EXPECT_TRUE(diagnosis.unexplained_structure);
+  EXPECT_THAT(diagnosis.where, testing::Contains("misfit over time"));
+}
+
 // A lens of 60 deg half the diagonal: the series of radtan does not converge there, so that the one
 // of Kannala and Brandt wins although it has twice the parameters.
 TEST(FindEffects, ChoosesTheSeriesOfAWideLens) {

@@ -74,6 +74,25 @@ TEST_F(StepTime, IsInTheMiddleOfFramesThatNoPairHas) {
   EXPECT_NEAR(Place(pairs, "5.1"), 0.5 * (last_before_s + first_after_s), 0.04);
 }
 
+// Whether the calibration has the delay before it or after it.
+TEST_F(StepTime, OfALargeStepIsBetweenTheBlocks) {
+  std::vector<PairBlock> blocks(5);
+  for (const TimedPair& pair : input_.pairs) {
+    const auto at = static_cast<size_t>(pair.time_a_s - 2.0);
+    if (pair.time_a_s > 2.0 && at < blocks.size()) blocks[at].push_back(pair);
+  }
+  const double delay_s = calibration_.delay_s;
+  for (const double off_s : {0.0, 0.01}) {
+    calibration_.delay_s = delay_s + off_s;
+    const auto step = FindLargeStep(input_, blocks, calibration_, 0.7, options_);
+    ASSERT_TRUE(step);
+    EXPECT_NEAR(step->delay_s, delay_s, 2e-3) << off_s;
+    EXPECT_NEAR(step->step_s, 0.01, 2e-3) << off_s;
+    EXPECT_NEAR(step->time_s, after_s_, 0.1) << off_s;
+    EXPECT_GT(step->explained, 0.8) << off_s;
+  }
+}
+
 // The shape has four decimals; a step after the last frame is none.
 TEST_F(StepTime, MayEndWithAFrameWhoseStampRoundsUp) {
   const auto last_s = [&] {
