@@ -364,6 +364,8 @@ class Loop {
         turned.prior_sigma = in_.prior.prior_sigma;
         const Result<Refined> with_turn = Fit(turned, noise);
         if (!with_turn) continue;
+        r.rejected = Implausible(with_turn->calibration);
+        if (!r.rejected.empty()) continue;
         std::vector<double> gain(choice.blocks.size(), 0.0);
         for (const PairScore& pair : choice.pairs) {
           gain[static_cast<size_t>(pair.block)] += pair.turn_gain;
@@ -389,7 +391,10 @@ class Loop {
         AddEffect(candidate, &anew);
         anew.prior_sigma = in_.prior.prior_sigma;
         const Result<Refined> other = Fit(anew, in_.noise);
-        if (other && (!fit || FitChi2(*other) < FitChi2(*fit))) fit = other;
+        const auto rank = [&](const Refined& f) {
+          return std::pair(!Implausible(f.calibration).empty(), FitChi2(f));
+        };
+        if (other && (!fit || rank(*other) < rank(*fit))) fit = other;
       }
       if (fit && r.name == "delay_step" && PlaceSteps(&fit->calibration)) {
         Calibration placed = fit->calibration;
@@ -416,13 +421,7 @@ class Loop {
       r.sigma = fit->calibration.effect_covariance.diagonal()
                     .segment(item.first, item.effect->size())
                     .cwiseSqrt();
-      for (int k = 0; k < item.effect->size(); ++k) {
-        const EffectParameter& p = r.parameter_info[static_cast<size_t>(k)];
-        if (r.estimate[k] < p.plausible_min - 2.0 * r.sigma[k] ||
-            r.estimate[k] > p.plausible_max + 2.0 * r.sigma[k]) {
-          r.rejected = p.name + " outside of what real devices show";
-        }
-      }
+      r.rejected = Implausible(fit->calibration);
       if (r.rejected.empty() && !GainBearsOut(r, static_cast<double>(all->size()))) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
@@ -503,6 +502,23 @@ class Loop {
       return (map.name == "delay over time" && IsStructure(map)) ||
              (map.name == "misfit over time" && map.statistic > 2.0 && map.p_value < 1e-3);
     });
+  }
+
+  // Why a fit cannot be right, by its last effect and by its focal length; empty: it can.
+  std::string Implausible(const Calibration& c) const {
+    const EffectSet::Item& item = c.effects->items().back();
+    for (int k = 0; k < item.effect->size(); ++k) {
+      const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+      const double value = c.effect_values[item.first + k];
+      const double sigma = std::sqrt(c.effect_covariance(item.first + k, item.first + k));
+      if (value < p.plausible_min - 2.0 * sigma || value > p.plausible_max + 2.0 * sigma) {
+        return p.name + " outside of what real devices show";
+      }
+    }
+    if (std::abs(std::log(c.lens[kFocal] / in_.start.lens[kFocal])) > M_LN2) {
+      return "the fit runs away with it";
+    }
+    return "";
   }
 
   // Focal length 15 % or centre 5 % of the diagonal from where it all began.

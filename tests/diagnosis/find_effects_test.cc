@@ -116,6 +116,17 @@ TEST(FindEffects, SaysThatAStretchDoesNotFit) {
   EXPECT_THAT(diagnosis.where, testing::Contains("misfit over time"));
 }
 
+// Here by a start at three times the focal length; in a recording that hardly turns, by itself.
+TEST(FindEffects, NamesNothingWithAFocalLengthThatRanAway) {
+  const Diagnosis diagnosis =
+      Find(Simulate(3, {"effects.radial_distortion={k1: -0.12, k2: 0.02}"}), 2000.0);
+  EXPECT_THAT(diagnosis.effects, testing::IsEmpty());
+  const auto& candidates = diagnosis.rounds.front().candidates;
+  EXPECT_TRUE(std::any_of(candidates.begin(), candidates.end(), [](const CandidateResult& c) {
+    return c.name == "radial_distortion" && c.rejected == "the fit runs away with it";
+  }));
+}
+
 // A lens of 60 deg half the diagonal: the series of radtan does not converge there, so that the one
 // of Kannala and Brandt wins although it has twice the parameters.
 TEST(FindEffects, ChoosesTheSeriesOfAWideLens) {
