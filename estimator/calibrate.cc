@@ -341,16 +341,29 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
       from = SettleEffects(recording, *first, refine).calibration;
       from.prior_sigma = prior.prior_sigma;
     }
+    RefinementOptions dropping = refinement;
+    dropping.graph.drop_without_ray = true;
     // Beside the fit of all pairs, each half alone.
     std::future<Halves> halves_fit;
-    if (static_cast<int>(input.pairs.size()) >= kMinPairsForUnseen) {
+    const auto begin_halves = [&](const RefinementOptions& with) {
+      if (static_cast<int>(input.pairs.size()) < kMinPairsForUnseen) return;
       halves_fit = std::async(std::launch::async, FitHalves, std::cref(input), std::cref(from),
-                              std::cref(prior), std::cref(refinement));
-    }
+                              std::cref(prior), std::cref(with));
+    };
+    begin_halves(refinement);
     Result<Refined> refined = Refine(input, input.pairs, from, prior, refinement);
     if (!refined && report.online) {  // a window that has run away, to a lens without rays
       refined = refine(from_start, options.refinement.graph.sigma_px);
       report.notes.push_back("the online estimate leads nowhere; all frames fitted from the start");
+    }
+    if (!refined && from.effects != nullptr) {
+      refined = Refine(input, input.pairs, from, prior, dropping);
+      begin_halves(dropping);
+      if (refined) {
+        report.notes.push_back(
+            "matches where the lens of the start has no ray, at the edge of the picture, are left "
+            "out");
+      }
     }
     if (!refined) return tl::unexpected(refined.error());
     report.calibration = refined->calibration;

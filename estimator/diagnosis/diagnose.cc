@@ -102,7 +102,13 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
     with.online = false;
     const Result<CalibrationReport> after =
         CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));
-    if (after) diagnosis.after = *after;
+    if (after) {
+      diagnosis.after = *after;
+    } else {
+      diagnosis.before->doubts.push_back(
+          "this calibration is without the effects: with them, the fit of all frames failed: " +
+          after.error().message);
+    }
   }
   return diagnosis;
 }

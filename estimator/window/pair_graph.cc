@@ -249,7 +249,10 @@ AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, int step,
 AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const FrameTime& frame_b,
                                  const std::vector<Match>& matches) {
   CHECK(pairs_.count(id) == 0);
-  const LensParameters lens = graph_.value(kLensBlock);
+  LensParameters lens = graph_.value(kLensBlock);
+  if (num_effects_ > 0 && options_.drop_without_ray) {
+    lens = prior_mean_.effects->ConstantLens(lens, graph_.value(kEffectsBlock));
+  }
   Pair pair;
   pair.time_s = frame_a.stamp_s;
   pair.measurement = std::make_shared<PairMeasurement>();

@@ -45,6 +45,9 @@ struct PairGraphOptions {
   double inlier_sigmas() const { return robust_threshold > 0.0 ? robust_threshold : 2.5; }
   // Prior of the bend of the path: how fast the direction of motion changes [rad/s].
   double turn_sigma_rad_s = 4.0;
+  // Matches without a ray through the lens as the effects make it at the start are left out, for
+  // good; else such a start has no solution. (Without effects, they always are.)
+  bool drop_without_ray = false;
   // White noise of one gyro sample per axis (Jia & Evans section V.C); see GyroSigma.
   Eigen::Vector3d gyro_sigma_rad_s = Eigen::Vector3d::Constant(0.003);
   double bias_walk_rad_s2_rtHz = 1e-4;

@@ -6,6 +6,7 @@
 
 #include "core/so3.h"
 #include "estimator/window/direction_search.h"
+#include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
 #include "factors/coplanarity_plane.h"
 #include "tools/simulation/simulate.h"
@@ -133,6 +134,32 @@ INSTANTIATE_TEST_SUITE_P(
       }
       return name;
     });
+
+// One pixel without a ray leaves a pair without residuals, and a solve without a start.
+TEST(EffectOfALens, LeavesOutPixelsWithoutARayIfAsked) {
+  Calibration start;
+  start.width_px = 640;
+  start.height_px = 480;
+  start.lens = MakePinhole(400.0, {319.5, 239.5});
+  start.prior_sigma.setOnes();
+  const Result<EffectSet> effects = MakeEffects("radial_distortion:radtan", EffectSetup());
+  ASSERT_TRUE(effects) << effects.error().message;
+  start.effects = std::make_shared<const EffectSet>(*effects);
+  start.effect_values = Eigen::Vector2d(-0.5, 0.0);  // folds 218 px from the centre
+  std::vector<Match> matches;
+  for (int i = 0; i < 12; ++i) {
+    matches.push_back({{220.0 + 20.0 * i, 200.0 + 7.0 * i}, {223.0 + 20.0 * i, 205.0 + 7.0 * i}});
+  }
+  matches[3].px_b << 5.0, 5.0;
+  for (const bool drop : {false, true}) {
+    PairGraphOptions options;
+    options.drop_without_ray = drop;
+    PairGraph graph(start, start, options);
+    for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {0.3, 0.1, 0.0}});
+    ASSERT_EQ(graph.AddPair(0, {0.2}, {0.2 + 1.0 / 30.0}, matches), AddPairResult::kAdded);
+    EXPECT_EQ(graph.Residuals(0, false).size(), drop ? 11U : 0U);
+  }
+}
 
 // Not in the simulator: the y and z axes are read later than x.
 TEST(GyroAxisDelay, FitsReadingsThatAreShiftedAxisByAxis) {
