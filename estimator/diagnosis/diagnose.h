@@ -45,9 +45,9 @@ struct CandidateResult {
   bool tried_anyway = false;
   std::string rejected;  // why not, empty if it could be chosen
   std::vector<EffectParameter> parameter_info;
-  Eigen::VectorXd estimate, sigma;  // of the refit, else of the score test
-  Eigen::VectorXd start;            // one step in the fit share: where a refit begins
-  double start_delay_change_s = 0.0;
+  Eigen::VectorXd estimate, sigma;    // of the refit, else of the score test
+  Eigen::VectorXd start;              // one step in the fit share: where a refit begins
+  double start_delay_change_s = 0.0;  // and of t_d there (FindLargeStep)
 };
 
 // How frames that neither fit nor choice has seen fit, all with the same noise.

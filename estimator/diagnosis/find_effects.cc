@@ -498,7 +498,7 @@ class Loop {
 
   bool DelayMoves() const {
     return std::any_of(last_maps_.begin(), last_maps_.end(), [this](const StructureMap& map) {
-      // To try is cheap, and a walk loses less than a run.
+      // To try costs a scan and a refit; a walk loses less to the loss than a run.
       return (map.name == "delay over time" && IsStructure(map)) ||
              (map.name == "misfit over time" && map.statistic > 2.0 && map.p_value < 1e-3);
     });
