@@ -89,8 +89,8 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
 ReportSection MapsSection(const Diagnosis& d) {
   std::string html = Paragraph(
       "What a change along each axis would be, if the model allowed it. Without structure it "
-      "scatters "
-      "about zero; p is that of the structure after the last effect.");
+      "scatters about zero, the misfit about one; p is that of the structure after the last "
+      "effect.");
   std::vector<std::string> charts;
   for (size_t m = 0; m < d.maps_after.size(); ++m) {
     const StructureMap& after = d.maps_after[m];

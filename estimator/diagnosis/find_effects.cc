@@ -426,7 +426,7 @@ class Loop {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
       if (r.rejected.empty() &&
-          PValueOfFit(fit->calibration, r.inflation) > options_.significance) {
+          PValueOfFit(fit->calibration, r.inflation, r.gain.sum) > options_.significance) {
         r.rejected = "not significant once fitted";
       }
       if (r.rejected.empty()) rivals.push_back(std::move(rival));
@@ -484,16 +484,19 @@ class Loop {
                            fit_.quality.noise_px, in_.graph, calibration);
   }
 
-  // Of the last effect's parameters being all zero, by their fit (Wald). The score extrapolates
-  // from zero, at derivatives of a model that may be far off.
-  static double PValueOfFit(const Calibration& calibration, double inflation) {
+  // Of the last effect's parameters being all zero, by both shares: Wald's statistic of the fit
+  // share and the gain in the choice share. If the best parameters are a of one and b of the other,
+  // in sigmas, the two are a^2 and at most 2ab - a^2, so that their sum is bounded by a^2 + b^2,
+  // chi2 with twice the parameters. The score extrapolates from zero, at derivatives of a model
+  // that may be far off.
+  static double PValueOfFit(const Calibration& calibration, double inflation, double gain) {
     const EffectSet::Item& item = calibration.effects->items().back();
     const int n = item.effect->size();
     const Eigen::VectorXd value = calibration.effect_values.segment(item.first, n);
     const Eigen::MatrixXd covariance =
         calibration.effect_covariance.block(item.first, item.first, n, n);
     const double statistic = value.dot(covariance.completeOrthogonalDecomposition().solve(value));
-    return ChiSquareTail(statistic / std::max(1.0, inflation), n);
+    return ChiSquareTail((statistic + std::max(0.0, gain)) / std::max(1.0, inflation), 2 * n);
   }
 
   bool DelayMoves() const {
