@@ -43,8 +43,10 @@ struct PairGraphOptions {
   double robust_threshold = 2.5;  // in sigmas; 0: none
   // Within so many sigmas a match counts as an inlier, also without loss.
   double inlier_sigmas() const { return robust_threshold > 0.0 ? robust_threshold : 2.5; }
-  // Prior of the bend of the path: how fast the direction of motion changes [rad/s].
-  double turn_sigma_rad_s = 4.0;
+  // Prior of the bend of the path: how fast the direction of motion changes [rad/s]. Steps turn it
+  // in phase with the rotation, so that what the prior takes from a turn becomes a bias of t_r, t_d
+  // and b_g; much wider than the turns are, directions follow the noise, which biases, too.
+  double turn_sigma_rad_s = 8.0;
   // Matches without a ray through the lens as the effects make it at the start are left out, for
   // good; else such a start has no solution. (Without effects, they always are.)
   bool drop_without_ray = false;

