@@ -425,8 +425,14 @@ class Loop {
       if (r.rejected.empty() && !GainBearsOut(r, static_cast<double>(all->size()))) {
         r.rejected = "no gain on unseen frames beyond its noise";
       }
-      if (r.rejected.empty() &&
-          PValueOfFit(fit->calibration, r.inflation, r.gain.sum) > options_.significance) {
+      // One that its score does not name is corrected for what could have been tried in its place:
+      // a step in every stretch.
+      const double chances =
+          r.tried_anyway
+              ? static_cast<double>(all->size() * (shares_.fit.size() + shares_.choice.size()))
+              : 1.0;
+      if (r.rejected.empty() && chances * PValueOfFit(fit->calibration, r.inflation, r.gain.sum) >
+                                    options_.significance) {
         r.rejected = "not significant once fitted";
       }
       if (r.rejected.empty()) rivals.push_back(std::move(rival));
