@@ -164,8 +164,9 @@ TEST(FindEffects, NamesTheGyrosFilterWhenWalking) {
   EXPECT_NEAR(found.estimate[0], 0.008 * 0.008, 4.0 * found.sigma[0]);
 }
 
-// Walking, five sigmas: the frames that choose, half of the data, have a gain of 6 +- 10 (9 +- 6
-// expected) with seed 2, which agrees; those that fit have little with seed 7. Both together tell.
+// Walking, five sigmas: the frames that choose, half of the data, have a gain of 6 +- 10 with seed
+// 2 (half of the statistic, 10, is expected), which agrees; those that fit have little with seed 7.
+// Both together tell.
 TEST(FindEffects, NamesALensThatIsNotCentred) {
   const std::pair<const char*, uint64_t> recordings[] = {
       {"walking", 2}, {"walking", 7}, {"running", 1}};
