@@ -7,8 +7,9 @@
 //
 // Threads: one producer per stream (gyro, accelerometer, frames), one reader, at the same time.
 // Everything is estimated in one thread of the calibrator's own. Adding copies the data and
-// returns; a snapshot never waits for estimation. Memory is bounded: by max_frames_waiting images,
-// 20 s of tracks and 60 s of inertial samples, whatever is fed. Nothing here throws or exits.
+// returns; a snapshot never waits for estimation. Memory is bounded, whatever is fed: by
+// max_frames_waiting images, 12 s of tracks, 60 s of gyro samples that wait for frames, 20 s of
+// inertial samples for InitialiseVins, and the window. Nothing here throws or exits.
 #ifndef CAMGYRO_CALIBRATOR_H_
 #define CAMGYRO_CALIBRATOR_H_
 

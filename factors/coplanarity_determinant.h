@@ -16,8 +16,8 @@ namespace camgyro {
 //
 //   r = Robustify( det(n_1, n_2, n_3) / sigma ),  n_i = (R_i f_i) x (R'_i f'_i)      eq. (4), (9)
 //
-// Parameters  lens         8   LensParameters
-//             shutter      2   t_d [s], t_r [s]
+// Parameters  lens         kLensSize     LensParameters
+//             shutter      kShutterSize  t_d [s], t_r [s]
 //             q_gyro_cam   4   RotationManifold
 //             effects      of PairMeasurement::effects, if there are any
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]

@@ -44,8 +44,9 @@ struct PairMeasurement {
 };
 
 // Order of the parameter blocks of the coplanarity factors:
-//   lens 8, shutter 2, q_gyro_cam 4 (RotationManifold), [tau 3 (SphereManifold<3>), bend 6,]
-//   [effects, if the pair has any,] rate groups, 3 * num_rate_values each
+//   lens kLensSize, shutter kShutterSize, q_gyro_cam 4 (RotationManifold),
+//   [tau 3 (SphereManifold<3>), bend 6,] [effects, if the pair has any,]
+//   rate groups, 3 * num_rate_values each
 // q_gyro_cam is stored [x y z w].
 inline int NumEffectBlocks(const PairMeasurement& pair) { return pair.effects ? 1 : 0; }
 

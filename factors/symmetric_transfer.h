@@ -18,8 +18,8 @@ namespace camgyro {
 //   r   = Robustify_norm( [e_b; e_a] / sqrt(2 (var_a + var_b)) )
 //   R_a, R_b: the camera's orientation at the exposure of px_a, px_b
 //
-// Parameters  lens         8   LensParameters
-//             shutter      2   t_d [s], t_r [s]
+// Parameters  lens         kLensSize     LensParameters
+//             shutter      kShutterSize  t_d [s], t_r [s]
 //             q_gyro_cam   4   RotationManifold
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    four per match. The two directions repeat one error: the sum of the four squares is

@@ -65,9 +65,9 @@ struct PairEffects {
   const double* values = nullptr;  // set->size() of them
 };
 
-// What the user asks for: "name" or "name:shape", separated by commas; without a shape, the last
-// (the most flexible) that the recording can show. Errors: kBadUsage for an unknown name (with the
-// nearest) or shape; kCannotEstimate if the recording cannot show the effect.
+// What the user asks for: "name" or "name:shape", separated by commas; without a shape, the usual
+// one of those that the recording can show. Errors: kBadUsage for an unknown name or shape (with
+// all that are known); kCannotEstimate if the recording cannot show the effect.
 Result<EffectSet> MakeEffects(const std::string& list, const EffectSetup& setup);
 
 }  // namespace camgyro

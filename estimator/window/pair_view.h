@@ -51,8 +51,8 @@ PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i)
 // per match. calibration: that of the view.
 std::vector<double> TransferResiduals(const PairView& view, const Calibration& calibration);
 
-// The samples that a pair needs, and one beyond on both sides; false where there are none, or a
-// gap is longer than 5 median intervals and 30 ms.
+// The samples that a pair needs, and one beyond on both sides; false where there are none, one is
+// saturated, or two of them are further apart than 30 ms and than five mean intervals.
 [[nodiscard]] bool RatesOfPair(const EstimationInput& input, const TimedPair& pair,
                                const Calibration& calibration, std::vector<double>* times_s,
                                Eigen::Matrix3Xd* rates);

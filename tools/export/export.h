@@ -1,10 +1,10 @@
 // A calibration in the files of other programs: one file of this folder per program.
 //
 // What each program means by time, with t_d and t_r as in core/calibration.h (t_d of row 0):
-//   kalibr, euroc, json   the stamp is row 0's: t_d as it is, and the line delay or readout beside
-//   it vins, openvins        the stamp is the middle row's: t_d + t_r / 2 gyroflow              the
-//   stamp is the middle row's, and its offset is subtracted from the video's
-//                         time where ours is added: -(t_d + t_r / 2)
+//   - kalibr, euroc, json: the stamp is row 0's: t_d as it is, line delay or readout beside it.
+//   - vins, openvins: the stamp is the middle row's: t_d + t_r / 2.
+//   - gyroflow: the stamp is the middle row's, and its offset is subtracted from the video's time
+//     where ours is added: -(t_d + t_r / 2).
 // Rotations: R_gyro_cam is q_gyro_cam as a matrix, camera vectors into the gyro (IMU) frame.
 #ifndef CAMGYRO_TOOLS_EXPORT_EXPORT_H_
 #define CAMGYRO_TOOLS_EXPORT_EXPORT_H_
