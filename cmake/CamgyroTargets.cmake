@@ -36,11 +36,13 @@ function(camgyro_library name)
   set_property(GLOBAL APPEND PROPERTY CAMGYRO_LIBRARIES camgyro_${name})
 endfunction()
 
-# camgyro_test(FOLDER SOURCES ... DEPS ... SLOW ...): one binary per folder, one ctest entry per test
-# case. SLOW: GoogleTest patterns of those that get the label `slow`, which CI's sanitizer run omits.
+# camgyro_test(FOLDER SOURCES ... DEPS ... SLOW ...): one binary per folder, test_FOLDER with _ for /,
+# one ctest entry per test case. SLOW: GoogleTest patterns of those that get the label `slow`, which
+# CI's sanitizer run omits.
 function(camgyro_test folder)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "SOURCES;DEPS;SLOW")
-  set(target test_${folder})
+  string(REPLACE "/" "_" name ${folder})
+  set(target test_${name})
   add_executable(${target} ${PROJECT_SOURCE_DIR}/tests/test_main.cc)
   foreach(source ${ARG_SOURCES})
     target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/${folder}/${source})
@@ -49,7 +51,7 @@ function(camgyro_test folder)
   target_compile_definitions(${target} PRIVATE
     CAMGYRO_SOURCE_DIR="${PROJECT_SOURCE_DIR}" CAMGYRO_BINARY_DIR="${PROJECT_BINARY_DIR}")
   include(GoogleTest)
-  set(how TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60
+  set(how TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
           PROPERTIES TIMEOUT 600 ENVIRONMENT "GLOG_minloglevel=2")
   if(ARG_SLOW)
     string(JOIN ":" slow ${ARG_SLOW})

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "core/time.h"
-#include "tests/estimator_window/simulated_input.h"
+#include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
 namespace {

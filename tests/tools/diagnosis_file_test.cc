@@ -1,6 +1,6 @@
-#include <gmock/gmock.h>
-
 #include "tools/diagnosis_file.h"
+
+#include <gmock/gmock.h>
 
 namespace camgyro {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
-#include "tests/frontend/recording_folder.h"
-#include "tests/frontend/write_video.h"
+#include "tests/frontend/readers/recording_folder.h"
+#include "tests/frontend/readers/write_video.h"
 
 namespace camgyro {
 namespace {

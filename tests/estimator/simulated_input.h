@@ -1,6 +1,6 @@
 // Short simulated recordings, a start that is off the truth, and the online pass over them.
-#ifndef CAMGYRO_TESTS_ESTIMATOR_WINDOW_SIMULATED_INPUT_H_
-#define CAMGYRO_TESTS_ESTIMATOR_WINDOW_SIMULATED_INPUT_H_
+#ifndef CAMGYRO_TESTS_ESTIMATOR_SIMULATED_INPUT_H_
+#define CAMGYRO_TESTS_ESTIMATOR_SIMULATED_INPUT_H_
 
 #include <gmock/gmock.h>
 
@@ -75,4 +75,4 @@ inline SlidingWindow MakeWindow(const simulation::Simulated& s,
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TESTS_ESTIMATOR_WINDOW_SIMULATED_INPUT_H_
+#endif  // CAMGYRO_TESTS_ESTIMATOR_SIMULATED_INPUT_H_

@@ -1,6 +1,6 @@
 // A recording folder that a test writes file by file; removed at the end of the test.
-#ifndef CAMGYRO_TESTS_FRONTEND_RECORDING_FOLDER_H_
-#define CAMGYRO_TESTS_FRONTEND_RECORDING_FOLDER_H_
+#ifndef CAMGYRO_TESTS_FRONTEND_READERS_RECORDING_FOLDER_H_
+#define CAMGYRO_TESTS_FRONTEND_READERS_RECORDING_FOLDER_H_
 
 #include <unistd.h>
 
@@ -66,4 +66,4 @@ class RecordingFolder {
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TESTS_FRONTEND_RECORDING_FOLDER_H_
+#endif  // CAMGYRO_TESTS_FRONTEND_READERS_RECORDING_FOLDER_H_

@@ -6,8 +6,8 @@
 
 #include "frontend/readers/mp4_box.h"
 #include "frontend/readers/sample_clock.h"
-#include "tests/frontend/gpmf_bytes.h"
-#include "tests/frontend/recording_folder.h"
+#include "tests/frontend/readers/gpmf_bytes.h"
+#include "tests/frontend/readers/recording_folder.h"
 
 namespace camgyro {
 namespace {

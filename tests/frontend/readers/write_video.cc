@@ -1,4 +1,4 @@
-#include "tests/frontend/write_video.h"
+#include "tests/frontend/readers/write_video.h"
 
 extern "C" {
 #include <libavcodec/avcodec.h>

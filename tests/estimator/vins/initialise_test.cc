@@ -11,7 +11,7 @@
 #include "core/so3.h"
 #include "estimator/vins/alignment.h"
 #include "estimator/vins/structure.h"
-#include "tests/estimator_vins/vins_scene.h"
+#include "tests/estimator/vins/vins_scene.h"
 
 namespace camgyro {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "estimator/window/refinement.h"
-#include "tests/estimator_window/simulated_input.h"
+#include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
 namespace {

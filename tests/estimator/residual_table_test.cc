@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/robust_statistics.h"
-#include "tests/estimator_window/simulated_input.h"
+#include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
 namespace {

@@ -1,5 +1,5 @@
 // Exports against files written by hand from the other programs' documented keys
-// (tests/tools/export_golden), and their meaning of time and axes against ours.
+// (tests/tools/export/golden), and their meaning of time and axes against ours.
 #include "tools/export/export.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-const char kGolden[] = CAMGYRO_SOURCE_DIR "/tests/tools/export_golden/";
+const char kGolden[] = CAMGYRO_SOURCE_DIR "/tests/tools/export/golden/";
 
 // The differences of two YAML trees, numbers to 1e-9; keys of `expected` only, or of
 // both.

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "../measured_data.h"
 #include "core/so3.h"
 #include "estimator/start/find_start.h"
 #include "frontend/readers/read_recording.h"
+#include "tests/measured_data.h"
 
 namespace camgyro {
 namespace {

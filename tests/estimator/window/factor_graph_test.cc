@@ -12,7 +12,7 @@
 #include "factors/gyro_rate.h"
 #include "factors/marginal_prior.h"
 #include "factors/relative_rotation.h"
-#include "tests/estimator_window/linear_factor.h"
+#include "tests/estimator/window/linear_factor.h"
 
 namespace camgyro {
 namespace {

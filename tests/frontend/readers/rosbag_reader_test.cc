@@ -11,7 +11,7 @@
 
 #include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
-#include "tests/frontend/recording_folder.h"
+#include "tests/frontend/readers/recording_folder.h"
 
 namespace camgyro {
 namespace {

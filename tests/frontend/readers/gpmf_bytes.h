@@ -1,6 +1,6 @@
 // Composes GPMF items for tests.
-#ifndef CAMGYRO_TESTS_FRONTEND_GPMF_BYTES_H_
-#define CAMGYRO_TESTS_FRONTEND_GPMF_BYTES_H_
+#ifndef CAMGYRO_TESTS_FRONTEND_READERS_GPMF_BYTES_H_
+#define CAMGYRO_TESTS_FRONTEND_READERS_GPMF_BYTES_H_
 
 #include <cstdint>
 #include <cstring>
@@ -59,4 +59,4 @@ inline std::string GpmfShort(const std::string& key, int16_t value) {
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TESTS_FRONTEND_GPMF_BYTES_H_
+#endif  // CAMGYRO_TESTS_FRONTEND_READERS_GPMF_BYTES_H_

@@ -1,4 +1,6 @@
 // The track level against projections written here from the definitions of design.md section 1.
+#include "tools/simulation/simulate.h"
+
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -6,7 +8,6 @@
 
 #include "core/so3.h"
 #include "core/time.h"
-#include "tools/simulation/simulate.h"
 
 namespace camgyro::simulation {
 namespace {

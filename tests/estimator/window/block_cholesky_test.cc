@@ -4,7 +4,7 @@
 
 #include <Eigen/Dense>
 
-#include "tests/estimator_window/linear_factor.h"
+#include "tests/estimator/window/linear_factor.h"
 
 namespace camgyro {
 namespace {

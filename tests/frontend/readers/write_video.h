@@ -1,6 +1,6 @@
 // Writes small MP4 files for tests: MPEG-4 pictures, and telemetry packets like a GoPro's.
-#ifndef CAMGYRO_TESTS_FRONTEND_WRITE_VIDEO_H_
-#define CAMGYRO_TESTS_FRONTEND_WRITE_VIDEO_H_
+#ifndef CAMGYRO_TESTS_FRONTEND_READERS_WRITE_VIDEO_H_
+#define CAMGYRO_TESTS_FRONTEND_READERS_WRITE_VIDEO_H_
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -24,4 +24,4 @@ bool WriteVideo(const std::string& file, const VideoSpec& spec);
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TESTS_FRONTEND_WRITE_VIDEO_H_
+#endif  // CAMGYRO_TESTS_FRONTEND_READERS_WRITE_VIDEO_H_

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "frontend/camera_rotations.h"
-#include "tests/estimator_window/simulated_input.h"
+#include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
 namespace {
