@@ -153,11 +153,7 @@ void DirectionSearch(benchmark::State& state) {
 }
 BENCHMARK(DirectionSearch)->Unit(benchmark::kMicrosecond);
 
-Calibration StartAt(const Calibration& truth) {
-  Calibration start = truth;
-  start.prior_sigma = PaperStart(truth).prior_sigma;
-  return start;
-}
+Prior StartAt(const Calibration& truth) { return {truth, PaperStart(truth).sigma}; }
 
 constexpr int kSteps = 300;
 
@@ -165,10 +161,10 @@ constexpr int kSteps = 300;
 // side, `frames` to a pair: the time per frame is the time of a step over that.
 void WindowStep(benchmark::State& state) {
   const Simulated s = MakeRecording(60.0);
-  const Calibration start = StartAt(s.truth);
+  const Prior start = StartAt(s.truth);
   SlidingWindowOptions options;
   options.graph.sigma_px = 0.5;
-  SlidingWindow window(start, start, s.recording.gyro.front().stamp_ns, options);
+  SlidingWindow window(start.mean, start, s.recording.gyro.front().stamp_ns, options);
   for (const GyroSample& sample : s.recording.gyro) {
     CHECK(window.AddGyroSample(sample) == AddResult::kAccepted);
   }

@@ -346,9 +346,8 @@ class Calibrator::Worker {
     const camgyro::Calibration& c = *progress.estimate;
     next->has_estimate = true;
     next->calibration = ToApi(c);
-    StateVector value = StateVector::Zero(), wanted;
-    value << c.lens[camgyro::kFocal], c.lens[camgyro::kCx], c.lens[camgyro::kCy], c.readout_s,
-        c.delay_s, c.bias_gyro_rad_s, Eigen::Vector3d::Zero();
+    const StateVector value = ValuesOf(c, c.q_gyro_cam);
+    StateVector wanted;
     const double principal_px = options_.ready_principal * c.width_px;
     wanted << options_.ready_focal * c.lens[camgyro::kFocal], principal_px, principal_px,
         options_.ready_readout_s, options_.ready_delay_s,
@@ -361,7 +360,7 @@ class Calibrator::Worker {
       p.value = value[i];
       p.sigma = sigma[i];
       p.wanted_sigma = wanted[i];
-      p.readiness = !(sigma[i] < 0.5 * c.prior_sigma[i])         ? Readiness::kUndetermined
+      p.readiness = !(sigma[i] < 0.5 * progress.prior_sigma[i])  ? Readiness::kUndetermined
                     : !(sigma[i] <= wanted[i])                   ? Readiness::kImprecise
                     : !(progress.movement[i] <= 2.0 * wanted[i]) ? Readiness::kUnsteady
                                                                  : Readiness::kReady;

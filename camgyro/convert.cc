@@ -261,11 +261,9 @@ const char* ToString(VinsVerdict verdict) noexcept {
 }
 
 const char* ParameterName(int parameter) noexcept {
-  static constexpr std::array<const char*, kParameters> kNames = {
-      "focal_px",       "cx_px",          "cy_px",         "readout_s",
-      "delay_s",        "bias_x_rad_s",   "bias_y_rad_s",  "bias_z_rad_s",
-      "rotation_x_rad", "rotation_y_rad", "rotation_z_rad"};
-  return parameter >= 0 && parameter < kParameters ? kNames[static_cast<size_t>(parameter)] : "";
+  return parameter >= 0 && parameter < kParameters
+             ? StateTable()[static_cast<size_t>(parameter)].long_name
+             : "";
 }
 
 }  // namespace api

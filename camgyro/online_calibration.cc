@@ -109,9 +109,9 @@ Status OnlineCalibration::TryStart() {
 
   gap_ = SelectPairs(recording, /*longest_gap=*/10, /*least_pairs=*/10).gap;
 
-  const Calibration prior = MakePrior(recording, *start);
-  prior_sigma_ = prior.prior_sigma;
-  Calibration from = prior;
+  const Prior prior = MakePrior(recording, *start);
+  progress_.prior_sigma = prior.sigma;
+  Calibration from = prior.mean;
   from.bias_gyro_rad_s = start->bias_gyro_rad_s;
   if (start->focal && start->focal->determined) from.lens[kFocal] = start->focal->value_px;
   SlidingWindowOptions window_options;
@@ -172,7 +172,6 @@ bool OnlineCalibration::AddPair(const OnlineFrame& a, const OnlineFrame& b) {
 void OnlineCalibration::Remember(const WindowUpdate& update) {
   last_solved_ns_ = std::max(last_solved_ns_, update.frame_stamp_ns);
   progress_.estimate = update.estimate;
-  progress_.estimate->prior_sigma = prior_sigma_;
   progress_.frame_stamp_ns = update.frame_stamp_ns;
   progress_.noise_px = update.noise_px;
   history_.emplace_back(update.frame_stamp_ns, update.estimate);

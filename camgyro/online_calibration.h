@@ -28,7 +28,8 @@ class OnlineCalibration {
   struct Progress {
     bool estimating = false;
     std::string message;                  // why there is no start yet
-    std::optional<Calibration> estimate;  // with covariance and prior_sigma
+    std::optional<Calibration> estimate;  // with covariance
+    StateVector prior_sigma = StateVector::Zero();
     int64_t frame_stamp_ns = 0;
     double noise_px = 0.0;
     // Largest change of each parameter within the last two seconds of the camera; infinite before.
@@ -60,7 +61,6 @@ class OnlineCalibration {
   const double start_s_;
   const std::function<void(const Progress&)> listener_;
   Progress progress_;
-  StateVector prior_sigma_ = StateVector::Zero();
 
   std::deque<GyroSample> gyro_;     // not yet in the window
   std::deque<OnlineFrame> frames_;  // collected, or waiting for the gyro; the first was used

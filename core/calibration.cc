@@ -4,13 +4,6 @@
 
 namespace camgyro {
 
-const std::array<std::string, kStateSize>& StateNames() {
-  static const std::array<std::string, kStateSize> names = {
-      "focal_px", "cx_px",  "cy_px", "readout_s", "delay_s", "bias_x",
-      "bias_y",   "bias_z", "q_x",   "q_y",       "q_z"};
-  return names;
-}
-
 StateVector Difference(const Calibration& a, const Calibration& b) {
   StateVector d;
   d[kStateFocal] = a.lens[kFocal] - b.lens[kFocal];
@@ -21,6 +14,23 @@ StateVector Difference(const Calibration& a, const Calibration& b) {
   d.segment<3>(kStateBias) = a.bias_gyro_rad_s - b.bias_gyro_rad_s;
   d.segment<3>(kStateRotation) = Log(Eigen::Quaterniond(b.q_gyro_cam.conjugate() * a.q_gyro_cam));
   return d;
+}
+
+Calibration Moved(Calibration c, const StateVector& d) {
+  c.lens[kFocal] += d[kStateFocal];
+  c.lens[kCx] += d[kStateCx];
+  c.lens[kCy] += d[kStateCy];
+  c.readout_s += d[kStateReadout];
+  c.delay_s += d[kStateDelay];
+  c.bias_gyro_rad_s += d.segment<3>(kStateBias);
+  c.q_gyro_cam = c.q_gyro_cam * Exp(Eigen::Vector3d(d.segment<3>(kStateRotation)));
+  return c;
+}
+
+StateVector ValuesOf(const Calibration& c, const Eigen::Quaterniond& q_reference) {
+  Calibration zero;
+  zero.q_gyro_cam = q_reference;
+  return Difference(c, zero);
 }
 
 }  // namespace camgyro

@@ -6,30 +6,12 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <memory>
-#include <string>
 
 #include "core/effects/catalogue.h"
 #include "core/lens.h"
+#include "core/state.h"
 
 namespace camgyro {
-
-// Order of the state in covariances, as in eq. (7): f, c, t_r, t_d, b_g, q_c. The rotation is its
-// tangent: right perturbation of q_gyro_cam, about the camera's axes [rad].
-enum StateIndex : int {
-  kStateFocal,
-  kStateCx,
-  kStateCy,
-  kStateReadout,
-  kStateDelay,
-  kStateBias,          // 3
-  kStateRotation = 8,  // 3
-  kStateSize = 11
-};
-// Names in that order, as in calibration.yaml's `covariance: order`.
-const std::array<std::string, kStateSize>& StateNames();
-
-using StateVector = Eigen::Matrix<double, kStateSize, 1>;
-using StateCovariance = Eigen::Matrix<double, kStateSize, kStateSize>;
 
 struct Calibration {
   int width_px = 0, height_px = 0;
@@ -41,8 +23,6 @@ struct Calibration {
   Eigen::Quaterniond q_gyro_cam = Eigen::Quaterniond::Identity();
 
   StateCovariance covariance = StateCovariance::Zero();
-  // Standard deviations that the start gave: the uncertainty without this recording's frames.
-  StateVector prior_sigma = StateVector::Zero();
   // Parameters that the data informed: sigma well below the prior's.
   std::array<bool, kStateSize> determined{};
 
@@ -62,8 +42,22 @@ struct Calibration {
   StateVector sigma() const { return covariance.diagonal().cwiseSqrt(); }
 };
 
+// What is believed of a calibration before a recording's frames: a Gaussian around the values of
+// `mean`, whose parameters are independent. The covariance in `mean` is not used.
+struct Prior {
+  Calibration mean;
+  StateVector sigma = StateVector::Zero();  // [px, s, rad/s, rad]
+};
+
 // a [-] b: difference of two calibrations in the tangent, in the order of StateIndex.
 StateVector Difference(const Calibration& a, const Calibration& b);
+
+// c [+] d: the calibration that differs from c by d.
+Calibration Moved(Calibration c, const StateVector& d);
+
+// The parameters as numbers; the mounting as a rotation vector about the camera's axes, counted
+// from `q_reference` (camera -> gyro) [px, s, rad/s, rad].
+StateVector ValuesOf(const Calibration& c, const Eigen::Quaterniond& q_reference);
 
 }  // namespace camgyro
 

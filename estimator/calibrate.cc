@@ -87,7 +87,7 @@ struct Halves {
 
 // Each half of the pairs is fitted alone, and the other one tells how well. The pairs across the
 // middle belong to neither, so that no frame is in both.
-Halves FitHalves(const EstimationInput& input, const Calibration& from, const Calibration& prior,
+Halves FitHalves(const EstimationInput& input, const Calibration& from, const Prior& prior,
                  const RefinementOptions& refinement) {
   const auto middle = input.pairs.begin() + static_cast<std::ptrdiff_t>(input.pairs.size() / 2);
   std::array<std::vector<TimedPair>, 2> halves;
@@ -124,15 +124,16 @@ Halves FitHalves(const EstimationInput& input, const Calibration& from, const Ca
 }
 
 // A parameter is determined if the data shrank its prior and the result is of practical use.
-void MarkDetermined(bool attitudes, Calibration* c) {
-  StateVector useful;
-  useful << 0.05 * c->lens[kFocal], 0.02 * c->width_px, 0.02 * c->width_px, 3e-3, 3e-3,
-      Eigen::Vector3d::Constant(0.02), Eigen::Vector3d::Constant(0.03);
+void MarkDetermined(bool attitudes, const Prior& prior, Calibration* c) {
+  StateScales scales;
+  scales.focal_px = c->lens[kFocal];
+  scales.width_px = c->width_px;
   const StateVector sigma = c->sigma();
   for (int i = 0; i < kStateSize; ++i) {
-    const bool pixels_needed = i <= kStateReadout;
-    c->determined[static_cast<size_t>(i)] =
-        !(attitudes && pixels_needed) && sigma[i] < useful[i] && sigma[i] < 0.5 * c->prior_sigma[i];
+    const StateParameter& parameter = StateTable()[static_cast<size_t>(i)];
+    c->determined[static_cast<size_t>(i)] = !(attitudes && parameter.needs_pixels) &&
+                                            sigma[i] < parameter.useful_sigma.In(scales) &&
+                                            sigma[i] < 0.5 * prior.sigma[i];
   }
   // Rows are timed by the angles between them: without a focal length there are none.
   if (!c->determined[kStateFocal]) c->determined[kStateReadout] = false;
@@ -184,9 +185,10 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
 
 }  // namespace
 
-Calibration MakePrior(const Recording& recording, const StartResult& start) {
+Prior MakePrior(const Recording& recording, const StartResult& start) {
   const CameraGuess& guess = recording.camera;
-  Calibration prior;
+  Prior result;
+  Calibration& prior = result.mean;
   prior.width_px = guess.width_px;
   prior.height_px = guess.height_px;
   prior.distortion_model = guess.distortion_model;
@@ -205,20 +207,28 @@ Calibration MakePrior(const Recording& recording, const StartResult& start) {
   prior.delay_s = start.delay_middle_row_s - 0.5 * prior.readout_s;
   prior.q_gyro_cam = start.q_gyro_cam;
 
-  StateVector& sigma = prior.prior_sigma;
-  sigma[kStateFocal] = (guess.focal_px ? 0.15 : 0.30) * focal;
-  sigma[kStateCx] = sigma[kStateCy] = 0.02 * std::hypot(guess.width_px, guess.height_px);
-  sigma[kStateReadout] = guess.readout_s ? 5e-3 : 0.6 * interval;
+  const StateScales scales{focal, static_cast<double>(guess.width_px),
+                           std::hypot(guess.width_px, guess.height_px), interval};
+  std::array<bool, kStateSize> declared{};
+  declared[kStateFocal] = guess.focal_px.has_value();
+  declared[kStateReadout] = guess.readout_s.has_value();
+  StateVector& sigma = result.sigma;
+  for (size_t i = 0; i < kStateSize; ++i) {
+    const StateParameter& parameter = StateTable()[i];
+    sigma[static_cast<Eigen::Index>(i)] =
+        (declared[i] ? parameter.declared_sigma : parameter.usual_sigma).In(scales);
+  }
   if (recording.tracks.empty() && recording.matches.empty()) {
     // An attitude has neither pixels nor rows: nothing depends on the lens, and the readout is 0.
     prior.readout_s = 0.0;
     prior.delay_s = start.delay_middle_row_s;
-    sigma.segment<4>(kStateFocal).setOnes();
+    for (size_t i = 0; i < kStateSize; ++i) {
+      if (StateTable()[i].needs_pixels) sigma[static_cast<Eigen::Index>(i)] = 1.0;
+    }
   }
-  sigma[kStateDelay] = 0.05;
-  sigma.segment<3>(kStateBias).setConstant(0.1);
-  sigma.segment<3>(kStateRotation) = start.rotation_sigma_rad.cwiseMax(0.15);
-  return prior;
+  auto rotation = sigma.segment<3>(kStateRotation);
+  rotation = start.rotation_sigma_rad.cwiseMax(rotation);
+  return result;
 }
 
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
@@ -257,15 +267,16 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   for (const std::string& note : start->notes) report.notes.push_back("at the start: " + note);
   clock.Finish("start");
 
-  const Calibration prior = MakePrior(recording, *start);
-  Calibration estimate = prior;
+  const Prior prior = MakePrior(recording, *start);
+  report.prior = prior;
+  Calibration estimate = prior.mean;
   estimate.bias_gyro_rad_s = start->bias_gyro_rad_s;
   if (start->focal && start->focal->determined) estimate.lens[kFocal] = start->focal->value_px;
   if (options.from) {
     estimate = *options.from;
-    estimate.prior_sigma = prior.prior_sigma;
   } else if (!options.effects.empty()) {
-    Result<EffectSet> effects = MakeEffects(options.effects, MakeEffectSetup(recording, prior));
+    Result<EffectSet> effects =
+        MakeEffects(options.effects, MakeEffectSetup(recording, prior.mean));
     if (!effects) return tl::unexpected(effects.error());
     estimate.effect_values = Eigen::VectorXd::Zero(effects->size());
     estimate.effects = std::make_shared<const EffectSet>(std::move(*effects));
@@ -313,7 +324,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     if (!report.trace.empty()) {
       estimate = window.latest().estimate;
       report.online = estimate;
-      MarkDetermined(attitudes, &*report.online);
+      MarkDetermined(attitudes, prior, &*report.online);
     }
     clock.Finish("window");
   }
@@ -323,12 +334,10 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     refinement.graph = graph_options;
     if (!report.trace.empty()) refinement.graph.sigma_px = report.trace.back().noise_px;
     Calibration from = estimate;
-    from.prior_sigma = prior.prior_sigma;
     const double duration = input.pairs.back().time_b_s - input.pairs.front().time_a_s;
     refinement.cluster_s = std::clamp(duration / 12.0, 0.2, refinement.cluster_s);
     tell("refinement", 0.0);
-    const auto refine = [&](Calibration again_from, double noise) {
-      again_from.prior_sigma = prior.prior_sigma;
+    const auto refine = [&](const Calibration& again_from, double noise) {
       RefinementOptions again = refinement;
       (attitudes ? again.sigma_rad : again.graph.sigma_px) = noise;
       return Refine(input, input.pairs, again_from, prior, again);
@@ -339,7 +348,6 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
       const Result<Refined> first = Refine(input, input.pairs, from, prior, refinement);
       if (!first) return tl::unexpected(first.error());
       from = SettleEffects(recording, *first, refine).calibration;
-      from.prior_sigma = prior.prior_sigma;
     }
     RefinementOptions dropping = refinement;
     dropping.graph.drop_without_ray = true;
@@ -390,14 +398,12 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     report.quality.noise_px = report.trace.back().noise_px;
     report.converged = true;
   }
-  report.calibration.prior_sigma = prior.prior_sigma;
-  MarkDetermined(attitudes, &report.calibration);
+  MarkDetermined(attitudes, prior, &report.calibration);
   if (!report.converged) {  // delay and bias come from rates; the rest needs the fit
-    for (const int i : {0, 1, 2, 3, 8, 9, 10}) {  // f, c, t_r, q_c in the order of StateIndex
-      report.calibration.determined[static_cast<size_t>(i)] = false;
+    for (size_t i = 0; i < kStateSize; ++i) {
+      if (StateTable()[i].needs_fit) report.calibration.determined[i] = false;
     }
   }
-  if (report.online) report.online->prior_sigma = prior.prior_sigma;
   AddDoubts(recording, &report);
   tell("refinement", 1.0);
   return report;

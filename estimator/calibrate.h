@@ -42,6 +42,7 @@ struct StageTime {
 
 struct CalibrationReport {
   Calibration calibration;  // the result
+  Prior prior;
   // The online pass alone; absent for recordings of attitudes.
   std::optional<Calibration> online;
   std::vector<WindowUpdate> trace;  // one per solved window
@@ -73,13 +74,12 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                                              const CalibrateOptions& options,
                                              const Progress& progress = nullptr);
 
-// The Gaussian prior of a calibration: what the files declare, with the spread that such
-// declarations have, or what phones are like where they declare nothing.
-//   f: 15 % around the declared one, 30 % around the scan's; c: 2 % of the diagonal around the
-//   centre; t_r: declared +- 5 ms, else half of the shorter of frame interval and 1/30 s, +- 60 %
-//   of that interval; t_d: +- 50 ms around the search's; b_g: 0 +- 0.1 rad/s; q_c: +- 0.15 rad
-//   around the search's. Attitudes: t_r 0, and units for what needs pixels.
-Calibration MakePrior(const Recording& recording, const StartResult& start);
+// The Gaussian prior of a calibration, as wide as the table of the state says (core/state.h).
+//   f: the declared one, else the scan's; c: the declared one, else the centre; t_r: declared, else
+//   half of the shorter of frame interval and 1/30 s; t_d: the search's; b_g: 0; q_c: the search's,
+//   with its sigma where that is wider than the table's. Attitudes: t_r 0, and units for what needs
+//   pixels.
+Prior MakePrior(const Recording& recording, const StartResult& start);
 
 // Noise and loss as CalibrateRecording uses them for this recording.
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,

@@ -53,15 +53,14 @@ CalibrationReport Calibrate(Recording* recording, bool refine) {
 std::map<std::string, py::array> Trace(const CalibrationReport& report) {
   const auto rows = static_cast<py::ssize_t>(report.trace.size());
   py::array_t<int64_t> stamps(rows);
-  py::array_t<double> values({rows, py::ssize_t{8}}), sigmas({rows, py::ssize_t{kStateSize}});
+  py::array_t<double> values({rows, py::ssize_t{kStateRotation}}),
+      sigmas({rows, py::ssize_t{kStateSize}});
   for (py::ssize_t i = 0; i < rows; ++i) {
     const WindowUpdate& update = report.trace[static_cast<size_t>(i)];
     const Calibration& c = update.estimate;
     stamps.mutable_at(i) = update.frame_stamp_ns;
-    const Eigen::Vector3d& b = c.bias_gyro_rad_s;
-    const double row[] = {c.lens[kFocal], c.lens[kCx], c.lens[kCy], c.readout_s,
-                          c.delay_s,      b.x(),       b.y(),       b.z()};
-    std::copy(std::begin(row), std::end(row), values.mutable_data(i));
+    const StateVector row = ValuesOf(c, c.q_gyro_cam);
+    std::copy(row.data(), row.data() + kStateRotation, values.mutable_data(i));
     const StateVector sigma = c.sigma();
     std::copy(sigma.data(), sigma.data() + kStateSize, sigmas.mutable_data(i));
   }

@@ -129,7 +129,7 @@ Result<std::string> RunSeed(const Plan& plan, const Case& from, uint64_t seed) {
   run.estimators = comparison::RunEstimators(plan.estimators, *input, plan.graph, plan.ekf);
   if (from.scenario) {
     run.bound = comparison::InformationBound(
-        input->exact_matches, input->recording, input->truth, input->prior.prior_sigma,
+        input->exact_matches, input->recording, input->truth, input->prior.sigma,
         std::max(1e-3, input->noise_px), GyroSigma(input->recording, input->truth.delay_s).mean());
   }
   return comparison::Pack(run);

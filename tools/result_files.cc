@@ -133,21 +133,12 @@ std::string TemporaryName(const fs::path& file) {
       .string();
 }
 
-// Columns of a trace row: values in the trace's order, from the state's.
+// Columns of a trace row: the state's, with the quaternion in the place of the rotation.
 Values TraceValues(const Calibration& c) {
   const Eigen::Quaterniond& q = c.q_gyro_cam;
-  return {c.lens[kFocal],
-          c.lens[kCx],
-          c.lens[kCy],
-          c.readout_s,
-          c.delay_s,
-          c.bias_gyro_rad_s.x(),
-          c.bias_gyro_rad_s.y(),
-          c.bias_gyro_rad_s.z(),
-          q.w(),
-          q.x(),
-          q.y(),
-          q.z()};
+  Values values = Segment(ValuesOf(c, q), 0, kStateRotation);
+  values.insert(values.end(), {q.w(), q.x(), q.y(), q.z()});
+  return values;
 }
 
 }  // namespace
@@ -226,8 +217,9 @@ std::string CalibrationYaml(const CalibrationReport& report, bool attitudes) {
 std::string TraceCsv(const std::vector<WindowUpdate>& trace) {
   std::ostringstream out;
   out.precision(kDigits);
-  out << "#timestamp_ns,focal_px,cx_px,cy_px,readout_s,delay_s,bias_x,bias_y,bias_z,q_w,q_x,q_y,q_"
-         "z";
+  out << "#timestamp_ns";
+  for (size_t i = 0; i < kStateRotation; ++i) out << "," << StateNames()[i];
+  out << ",q_w,q_x,q_y,q_z";
   for (const std::string& name : StateNames()) out << ",sigma_" << name;
   out << "\n";
   for (const WindowUpdate& update : trace) {

@@ -45,11 +45,11 @@ void AddEffect(const Candidate& candidate, Calibration* calibration) {
   calibration->effect_covariance = Eigen::MatrixXd::Zero(set->size(), set->size());
 }
 
-Eigen::VectorXd PriorInformation(const Calibration& prior, const EffectSet* model,
+Eigen::VectorXd PriorInformation(const Prior& prior, const EffectSet* model,
                                  const EffectSet& candidates) {
   const int present = model != nullptr ? model->size() : 0;
   Eigen::VectorXd information(kStateSize + present + candidates.size());
-  information.head<kStateSize>() = prior.prior_sigma.cwiseAbs2().cwiseInverse();
+  information.head<kStateSize>() = prior.sigma.cwiseAbs2().cwiseInverse();
   for (int i = 0; i < present; ++i) {
     information[kStateSize + i] = std::pow(model->parameter(i).spread, -2.0);
   }
@@ -60,7 +60,7 @@ Eigen::VectorXd PriorInformation(const Calibration& prior, const EffectSet* mode
 }
 
 std::vector<std::vector<std::string>> Indistinguishable(
-    const Calibration& fit, const EffectSetup& setup, const Calibration& prior,
+    const Calibration& fit, const EffectSetup& setup, const Prior& prior,
     const std::function<Scores(const Calibration&, std::shared_ptr<const EffectSet>)>& scores_of) {
   constexpr double kAliasLimit = 0.95;
   std::vector<std::vector<std::string>> aliases;

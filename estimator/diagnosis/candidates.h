@@ -35,13 +35,13 @@ std::vector<Candidate> MissingEffects(const Calibration& model, const EffectSetu
 void AddEffect(const Candidate& candidate, Calibration* calibration);
 
 // 1 / sigma^2 of the priors: state, effects of the model (may be null), candidates.
-Eigen::VectorXd PriorInformation(const Calibration& prior, const EffectSet* model,
+Eigen::VectorXd PriorInformation(const Prior& prior, const EffectSet* model,
                                  const EffectSet& candidates);
 
 // Pairs of effects, one of them in the model, that this motion cannot tell apart. scores_of:
 // makes the scores of a calibration with candidates.
 std::vector<std::vector<std::string>> Indistinguishable(
-    const Calibration& fit, const EffectSetup& setup, const Calibration& prior,
+    const Calibration& fit, const EffectSetup& setup, const Prior& prior,
     const std::function<Scores(const Calibration&, std::shared_ptr<const EffectSet>)>& scores_of);
 
 }  // namespace camgyro

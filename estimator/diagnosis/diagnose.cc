@@ -72,7 +72,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   input.recording = &recording;
   input.prior = MakePrior(recording, report.start);
   input.fit = report.calibration;
-  input.start = input.prior;
+  input.start = input.prior.mean;
   input.start.bias_gyro_rad_s = report.start.bias_gyro_rad_s;
   input.graph = GraphOptionsFor(recording, report.start, options.calibrate);
   input.noise = report.quality.noise_px;

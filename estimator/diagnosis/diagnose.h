@@ -95,8 +95,9 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
 // indistinguishable of the result, and returns the fit share's calibration with the effects.
 struct LoopInput {
   const Recording* recording = nullptr;
-  Calibration fit;           // as the plain model has it
-  Calibration start, prior;  // where it all began; prior with prior_sigma
+  Calibration fit;    // as the plain model has it
+  Calibration start;  // where it all began
+  Prior prior;
   PairGraphOptions graph;
   double noise = 1.0;  // first guess [px], attitudes [rad]
 };

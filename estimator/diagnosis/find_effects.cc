@@ -72,9 +72,7 @@ class Loop {
                         " stretches; at least 25, 25 and 4 are needed";
       return in_.fit;
     }
-    Calibration start = in_.fit;
-    start.prior_sigma = in_.prior.prior_sigma;
-    const Result<Refined> first = Fit(start, in_.noise);
+    const Result<Refined> first = Fit(in_.fit, in_.noise);
     if (!first) return tl::unexpected(first.error());
     fit_ = *first;
     for (int round = 0; round < options_.max_rounds; ++round) {
@@ -361,7 +359,6 @@ class Loop {
         // stands, not the fall of chi2.
         Calibration turned = fit_.calibration;
         AddEffect(candidate, &turned);
-        turned.prior_sigma = in_.prior.prior_sigma;
         const Result<Refined> with_turn = Fit(turned, noise);
         if (!with_turn) continue;
         r.rejected = Implausible(with_turn->calibration);
@@ -384,12 +381,10 @@ class Loop {
       const int columns = candidate.effect->size();
       if (r.start.size() == columns) start.effect_values.tail(columns) = r.start;
       start.delay_s += r.start_delay_change_s;
-      start.prior_sigma = in_.prior.prior_sigma;
       Result<Refined> fit = Fit(start, noise);
       if (astray) {
         Calibration anew = in_.start;
         AddEffect(candidate, &anew);
-        anew.prior_sigma = in_.prior.prior_sigma;
         const Result<Refined> other = Fit(anew, in_.noise);
         const auto rank = [&](const Refined& f) {
           return std::pair(!Implausible(f.calibration).empty(), FitChi2(f));
@@ -397,16 +392,13 @@ class Loop {
         if (other && (!fit || rank(*other) < rank(*fit))) fit = other;
       }
       if (fit && r.name == "delay_step" && PlaceSteps(&fit->calibration)) {
-        Calibration placed = fit->calibration;
-        placed.prior_sigma = in_.prior.prior_sigma;
+        const Calibration placed = fit->calibration;
         r.shape = placed.effects->items().back().shape;
         fit = Fit(placed, noise);
       }
       if (fit) {
-        fit = SettleEffects(*in_.recording, *std::move(fit), [this](Calibration from, double px) {
-          from.prior_sigma = in_.prior.prior_sigma;
-          return Fit(from, px);
-        });
+        fit = SettleEffects(*in_.recording, *std::move(fit),
+                            [this](const Calibration& from, double px) { return Fit(from, px); });
       }
       if (!fit) {
         r.rejected = "the fit with it failed: " + fit.error().message;

@@ -5,8 +5,8 @@
 
 namespace camgyro {
 
-EkfRun RunEkf(const EstimationInput& input, const std::vector<Frame>& frames,
-              const Calibration& start, const EkfOptions& options) {
+EkfRun RunEkf(const EstimationInput& input, const std::vector<Frame>& frames, const Prior& start,
+              const EkfOptions& options) {
   using UpdateResult = ImplicitEkf::UpdateResult;
   EkfRun run;
   ImplicitEkf filter(start, options);
@@ -47,12 +47,13 @@ Result<CalibrationReport> CalibrateWithEkf(const Recording& recording,
   report.start = *found;
   report.times.push_back({"start", elapsed()});
 
-  Calibration start = PaperStart(MakePrior(recording, *found));
+  report.prior = PaperStart(MakePrior(recording, *found).mean);
+  Calibration& start = report.prior.mean;
   if (declared.principal_px) start.lens.segment<2>(kCx) = *declared.principal_px;
   if (declared.readout_s) start.readout_s = *declared.readout_s;
   if (declared.delay_s) start.delay_s = *declared.delay_s;
   start.q_gyro_cam = declared.q_gyro_cam.value_or(Eigen::Quaterniond(found->nearest_permutation));
-  EkfRun run = RunEkf(MakeEstimationInput(recording), recording.frames, start, ekf_options);
+  EkfRun run = RunEkf(MakeEstimationInput(recording), recording.frames, report.prior, ekf_options);
   if (run.trace.empty()) {
     return CannotEstimate(
         "no pair of frames could be used: they need three matches and gyro "
@@ -63,7 +64,7 @@ Result<CalibrationReport> CalibrateWithEkf(const Recording& recording,
   for (size_t i = 0; i < kStateSize; ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     report.calibration.determined[i] =
-        report.calibration.sigma()[row] < 0.5 * start.prior_sigma[row];
+        report.calibration.sigma()[row] < 0.5 * report.prior.sigma[row];
   }
   report.online = report.calibration;
   report.trace = std::move(run.trace);

@@ -16,8 +16,8 @@ struct EkfRun {
 };
 
 // Feeds pairs and readings in the order of real time. origin of both: input.origin_ns.
-EkfRun RunEkf(const EstimationInput& input, const std::vector<Frame>& frames,
-              const Calibration& start, const EkfOptions& options);
+EkfRun RunEkf(const EstimationInput& input, const std::vector<Frame>& frames, const Prior& start,
+              const EkfOptions& options);
 
 // `calibrate --estimator=ekf`: section V.C's start (PaperStart), with what the files declare of f,
 // c, t_r, t_d and q_c in place of its values; what they do not declare of f comes from the focal

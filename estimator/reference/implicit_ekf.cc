@@ -31,28 +31,29 @@ Eigen::Quaterniond Rotation(const VectorXd& x) {
 
 }  // namespace
 
-Calibration PaperStart(const Calibration& guess) {
-  Calibration start = guess;
+Prior PaperStart(const Calibration& guess) {
+  Prior prior{guess};
+  Calibration& start = prior.mean;
   start.lens[kCx] = 0.5 * (guess.width_px - 1);
   start.lens[kCy] = 0.5 * (guess.height_px - 1);
   start.readout_s = 0.0275;  // "0.0275 ms" in print, and "82.5 % of the interval": seconds
   start.delay_s = 0.0;
   start.bias_gyro_rad_s.setZero();
-  start.prior_sigma << 20.0, 6.67, 6.67, 0.00167, 0.01, Vector3d::Constant(0.0067),
+  prior.sigma << 20.0, 6.67, 6.67, 0.00167, 0.01, Vector3d::Constant(0.0067),
       Vector3d::Constant(2.0 * 0.0067);
-  start.covariance = start.prior_sigma.cwiseAbs2().asDiagonal();
-  return start;
+  start.covariance = prior.sigma.cwiseAbs2().asDiagonal();
+  return prior;
 }
 
-ImplicitEkf::ImplicitEkf(const Calibration& start, const EkfOptions& options)
-    : options_(options), start_(start), x_(kRates), random_(options.seed) {
+ImplicitEkf::ImplicitEkf(const Prior& prior, const EkfOptions& options)
+    : options_(options), start_(prior.mean), x_(kRates), random_(options.seed) {
+  const Calibration& start = prior.mean;
   x_ << start.lens[kFocal], start.lens[kCx], start.lens[kCy], start.readout_s, start.delay_s,
       start.bias_gyro_rad_s, start.q_gyro_cam.coeffs();
   VectorXd sigma(kRates);
   // The paper gives all four elements of q_c the same deviation, 0.0067; an angle is twice that.
-  const double sigma_element =
-      0.5 * start.prior_sigma.segment<3>(kStateRotation).norm() / std::sqrt(3.0);
-  sigma << start.prior_sigma.head<kStateRotation>(), Eigen::Vector4d::Constant(sigma_element);
+  const double sigma_element = 0.5 * prior.sigma.segment<3>(kStateRotation).norm() / std::sqrt(3.0);
+  sigma << prior.sigma.head<kStateRotation>(), Eigen::Vector4d::Constant(sigma_element);
   P_ = sigma.cwiseAbs2().asDiagonal();
 }
 

@@ -34,12 +34,12 @@ struct EkfOptions {
 // The initial values and standard deviations of section V.C around a guess of f and q_c: c the
 // centre of the picture, t_r 27.5 ms, t_d and b_g zero. `guess`: resolution, lens, q_gyro_cam are
 // used. The rotation's sigma is that of quaternion elements, doubled: an angle.
-Calibration PaperStart(const Calibration& guess);
+Prior PaperStart(const Calibration& guess);
 
 class ImplicitEkf {
  public:
-  // start: values, and prior_sigma as their initial standard deviations.
-  ImplicitEkf(const Calibration& start, const EkfOptions& options);
+  // prior: values with their initial standard deviations.
+  ImplicitEkf(const Prior& prior, const EkfOptions& options);
 
   // Gyro readings in time order, seconds from the filter's origin.
   void AddReading(double time_s, const Eigen::Vector3d& omega_gyro_rad_s);

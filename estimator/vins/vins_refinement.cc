@@ -265,15 +265,8 @@ class Problem {
     start->bias_accel_m_s2 = bias_accel_;
     start->p_gyro_cam_m = arm_;
     Calibration& c = start->calibration;
-    c = window_.calibration;
-    c.lens[kFocal] += calibration_[kStateFocal];
-    c.lens[kCx] += calibration_[kStateCx];
-    c.lens[kCy] += calibration_[kStateCy];
-    c.readout_s += calibration_[kStateReadout];
-    c.delay_s += calibration_[kStateDelay];
-    c.bias_gyro_rad_s += calibration_.segment<3>(kStateBias);
-    c.q_gyro_cam =
-        (c.q_gyro_cam * Exp(Vector3d(calibration_.segment<3>(kStateRotation)))).normalized();
+    c = Moved(window_.calibration, calibration_);
+    c.q_gyro_cam.normalize();
     start->noise_px = noise_px_;
     start->accel_noise_factor = accel_noise_factor_;
     start->observations = static_cast<int>(

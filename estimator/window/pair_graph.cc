@@ -40,10 +40,9 @@ int PairGraphOptions::RateStep(double interval_s, double focal_px) const {
   return std::max(1, static_cast<int>(std::min(samples, std::round(rate_step_s / interval_s))));
 }
 
-PairGraph::PairGraph(const Calibration& start, const Calibration& prior_mean,
-                     const PairGraphOptions& options)
-    : options_(options), prior_mean_(prior_mean) {
-  const StateVector& sigma = start.prior_sigma;
+PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGraphOptions& options)
+    : options_(options), prior_mean_(prior.mean), prior_sigma_(prior.sigma) {
+  const StateVector& sigma = prior.sigma;
   CHECK((sigma.array() > 0.0).all());
   Block lens{Geometry::kEuclidean, start.lens, {}};
   for (int k = kAspect; k < kLensSize; ++k) lens.constant.push_back(k);
@@ -62,12 +61,11 @@ PairGraph::PairGraph(const Calibration& start, const Calibration& prior_mean,
   inv_sigma.tail<3>() = sigma.segment<3>(kStateRotation).cwiseInverse();
   graph_.AddFactor(std::make_shared<MarginalPrior>(
                        std::vector<MarginalPrior::Block>{
-                           {prior_mean.lens, false},
-                           {ShutterParameters(prior_mean.delay_s, prior_mean.readout_s), false},
-                           {prior_mean.q_gyro_cam.coeffs(), true}},
+                           {prior.mean.lens, false},
+                           {ShutterParameters(prior.mean.delay_s, prior.mean.readout_s), false},
+                           {prior.mean.q_gyro_cam.coeffs(), true}},
                        inv_sigma.asDiagonal(), Eigen::VectorXd::Zero(size)),
                    {kLensBlock, kShutterBlock, kRotationBlock});
-  prior_mean_.prior_sigma = sigma;
   prior_mean_.effects = start.effects;
   start_bias_ = start.bias_gyro_rad_s;
   turn_sigma_rad_s_ = options_.turn_sigma_rad_s;
@@ -129,7 +127,7 @@ void PairGraph::AddBias(int64_t index) {
                          options_.bias_interval_s * static_cast<double>(index - previous_index)),
                      {BiasBlock(previous_index), BiasBlock(index)});
   } else {
-    const Eigen::Vector3d inv_sigma = prior_mean_.prior_sigma.segment<3>(kStateBias).cwiseInverse();
+    const Eigen::Vector3d inv_sigma = prior_sigma_.segment<3>(kStateBias).cwiseInverse();
     graph_.AddFactor(std::make_shared<MarginalPrior>(
                          std::vector<MarginalPrior::Block>{{prior_mean_.bias_gyro_rad_s, false}},
                          inv_sigma.asDiagonal(), Eigen::VectorXd::Zero(3)),

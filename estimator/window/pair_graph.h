@@ -109,10 +109,9 @@ class PairGraph {
  public:
   static constexpr int kMinMatches = 8;
 
-  // start: values with effects, and prior_sigma as the standard deviations of a Gaussian prior
-  // around `prior_mean` (zero bias, guess of the files, no effects, ...).
-  PairGraph(const Calibration& start, const Calibration& prior_mean,
-            const PairGraphOptions& options);
+  // start: values with effects. prior: of the values without effects (zero bias, guess of the
+  // files, ...); its sigmas are positive (CHECKed). Each effect brings a prior of its own.
+  PairGraph(const Calibration& start, const Prior& prior, const PairGraphOptions& options);
 
   // Samples in time order (CHECKed).
   void AddRate(const TimedRate& rate);
@@ -195,6 +194,7 @@ class PairGraph {
 
   PairGraphOptions options_;
   Calibration prior_mean_;
+  StateVector prior_sigma_;
   Eigen::Vector3d start_bias_ = Eigen::Vector3d::Zero();  // value of the first bias block
   FactorGraph graph_;
   double turn_sigma_rad_s_ = 0.0;  // of the options or, if wider, of the effects

@@ -80,7 +80,7 @@ constexpr double kCostTolerance = 0.005;
 }  // namespace
 
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-                       const Calibration& start, const Calibration& prior_mean,
+                       const Calibration& start, const Prior& prior,
                        const RefinementOptions& options) {
   Refined result;
   result.calibration = start;
@@ -109,9 +109,7 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
         LargestShift(pairs, before, built_at) > 0.5 * graph_options.rate_margin_s) {
       graph_options.sigma_px = scale;
       built_at = before;
-      Calibration from = before;
-      from.prior_sigma = start.prior_sigma;
-      graph = std::make_unique<PairGraph>(from, prior_mean, graph_options);
+      graph = std::make_unique<PairGraph>(before, prior, graph_options);
       for (const TimedRate& rate : input.rates) graph->AddRate(rate);
       result.skipped_pairs = 0;
       for (const TimedPair& pair : pairs) {

@@ -36,10 +36,10 @@ struct Refined {
   int skipped_pairs = 0;  // gyro gaps, too few matches, outside the gyro's time
 };
 
-// Fits all `pairs` of the input. start: values and prior_sigma; prior_mean: centre of the prior.
+// Fits all `pairs` of the input. start: values with effects.
 // Errors: kCannotEstimate if fewer than 10 pairs can be used or no solve succeeds.
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-                       const Calibration& start, const Calibration& prior_mean,
+                       const Calibration& start, const Prior& prior,
                        const RefinementOptions& options);
 
 // A fit with those effects made anew that depend on the calibration, and refitted, until it stays

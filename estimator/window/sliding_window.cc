@@ -9,11 +9,11 @@
 
 namespace camgyro {
 
-SlidingWindow::SlidingWindow(const Calibration& start, const Calibration& prior_mean,
-                             int64_t origin_ns, const SlidingWindowOptions& options)
+SlidingWindow::SlidingWindow(const Calibration& start, const Prior& prior, int64_t origin_ns,
+                             const SlidingWindowOptions& options)
     : options_(options),
       origin_ns_(origin_ns),
-      graph_(start, prior_mean, options.graph),
+      graph_(start, prior, options.graph),
       noise_px_(options.graph.sigma_px) {
   latest_.estimate = start;
   latest_.noise_px = noise_px_;

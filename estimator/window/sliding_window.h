@@ -47,8 +47,8 @@ struct WindowUpdate {
 
 class SlidingWindow {
  public:
-  // start: values, and prior_sigma around prior_mean. origin_ns: gyro clock; keep it near the data.
-  SlidingWindow(const Calibration& start, const Calibration& prior_mean, int64_t origin_ns,
+  // start: values with effects. origin_ns: gyro clock; keep it near the data.
+  SlidingWindow(const Calibration& start, const Prior& prior, int64_t origin_ns,
                 const SlidingWindowOptions& options);
 
   // Bad data are refused by the result and change nothing.

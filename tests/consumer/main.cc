@@ -26,12 +26,13 @@ int main(int argc, char** argv) {
     return 3;
   }
 
-  camgyro::Calibration start;
+  camgyro::Prior prior;
+  camgyro::Calibration& start = prior.mean;
   start.width_px = gray.cols;
   start.height_px = gray.rows;
   start.lens = camgyro::MakePinhole(0.8 * gray.cols, {0.5 * gray.cols, 0.5 * gray.rows});
-  start.prior_sigma.setConstant(0.1);
-  camgyro::SlidingWindow window(start, start, recording->gyro.front().stamp_ns, {});
+  prior.sigma.setConstant(0.1);
+  camgyro::SlidingWindow window(start, prior, recording->gyro.front().stamp_ns, {});
   for (const camgyro::GyroSample& sample : recording->gyro) {
     if (window.AddGyroSample(sample) != camgyro::AddResult::kAccepted) return 1;
   }

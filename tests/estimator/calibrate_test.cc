@@ -115,15 +115,15 @@ TEST(MakePrior, FollowsWhatTheFilesDeclare) {
   guess.focal_px = 600.0;
   guess.principal_px = Eigen::Vector2d(350.0, 250.0);
   guess.readout_s = 0.022;
-  const Calibration declared = MakePrior(s.recording, start);
-  EXPECT_EQ(declared.lens[kFocal], 600.0);
-  EXPECT_EQ(declared.lens[kCx], 350.0);
-  EXPECT_EQ(declared.readout_s, 0.022);
-  EXPECT_DOUBLE_EQ(declared.delay_s, 0.031 - 0.011);  // of the first row
-  EXPECT_DOUBLE_EQ(declared.prior_sigma[kStateFocal], 90.0);
-  EXPECT_DOUBLE_EQ(declared.prior_sigma[kStateReadout], 5e-3);
-  EXPECT_EQ(declared.prior_sigma[kStateRotation], 0.15);
-  EXPECT_EQ(declared.prior_sigma[kStateRotation + 1], 0.4);
+  const Prior declared = MakePrior(s.recording, start);
+  EXPECT_EQ(declared.mean.lens[kFocal], 600.0);
+  EXPECT_EQ(declared.mean.lens[kCx], 350.0);
+  EXPECT_EQ(declared.mean.readout_s, 0.022);
+  EXPECT_DOUBLE_EQ(declared.mean.delay_s, 0.031 - 0.011);  // of the first row
+  EXPECT_DOUBLE_EQ(declared.sigma[kStateFocal], 90.0);
+  EXPECT_DOUBLE_EQ(declared.sigma[kStateReadout], 5e-3);
+  EXPECT_EQ(declared.sigma[kStateRotation], 0.15);
+  EXPECT_EQ(declared.sigma[kStateRotation + 1], 0.4);
 
   guess = CameraGuess();
   guess.width_px = 720;
@@ -131,14 +131,14 @@ TEST(MakePrior, FollowsWhatTheFilesDeclare) {
   start.focal.emplace();
   start.focal->value_px = 655.0;
   start.focal->determined = true;
-  const Calibration found = MakePrior(s.recording, start);
-  EXPECT_EQ(found.lens[kFocal], 655.0);
-  EXPECT_EQ(found.lens[kCx], 359.5);
-  EXPECT_EQ(found.lens[kCy], 239.5);
-  EXPECT_DOUBLE_EQ(found.prior_sigma[kStateFocal], 0.3 * 655.0);
-  EXPECT_NEAR(found.prior_sigma[kStateCx], 0.02 * 865.3, 0.01);
-  EXPECT_NEAR(found.readout_s, 1.0 / 60, 1e-6);
-  EXPECT_NEAR(found.delay_s, 0.031 - 1.0 / 120, 1e-6);
+  const Prior found = MakePrior(s.recording, start);
+  EXPECT_EQ(found.mean.lens[kFocal], 655.0);
+  EXPECT_EQ(found.mean.lens[kCx], 359.5);
+  EXPECT_EQ(found.mean.lens[kCy], 239.5);
+  EXPECT_DOUBLE_EQ(found.sigma[kStateFocal], 0.3 * 655.0);
+  EXPECT_NEAR(found.sigma[kStateCx], 0.02 * 865.3, 0.01);
+  EXPECT_NEAR(found.mean.readout_s, 1.0 / 60, 1e-6);
+  EXPECT_NEAR(found.mean.delay_s, 0.031 - 1.0 / 120, 1e-6);
 }
 
 }  // namespace

@@ -34,15 +34,16 @@ inline simulation::Scenario FarScenario(double duration_s) {
 
 // The truth with the focal length 5 % and the delay 5 ms off, q_gyro_cam by 20 mrad per axis and
 // no bias; the prior is as wide as that of a phone's declaration.
-inline Calibration StartOffTheTruth(const Calibration& truth) {
-  Calibration start = truth;
+inline Prior StartOffTheTruth(const Calibration& truth) {
+  Prior prior{truth};
+  Calibration& start = prior.mean;
   start.lens[kFocal] *= 1.05;
   start.delay_s += 0.005;
   start.q_gyro_cam = start.q_gyro_cam * Exp(Eigen::Vector3d(0.02, -0.02, 0.02));
   start.bias_gyro_rad_s.setZero();
-  start.prior_sigma << 0.15 * truth.lens[kFocal], 17.0, 17.0, 0.005, 0.05,
-      Eigen::Vector3d::Constant(0.1), Eigen::Vector3d::Constant(0.15);
-  return start;
+  prior.sigma << 0.15 * truth.lens[kFocal], 17.0, 17.0, 0.005, 0.05, Eigen::Vector3d::Constant(0.1),
+      Eigen::Vector3d::Constant(0.15);
+  return prior;
 }
 
 // Errors in sigmas of the estimate.
@@ -69,8 +70,8 @@ inline void FeedAll(const Recording& recording, SlidingWindow* window) {
 
 inline SlidingWindow MakeWindow(const simulation::Simulated& s,
                                 const SlidingWindowOptions& options = {}) {
-  const Calibration start = StartOffTheTruth(s.truth);
-  return SlidingWindow(start, start, s.recording.gyro.front().stamp_ns, options);
+  const Prior start = StartOffTheTruth(s.truth);
+  return SlidingWindow(start.mean, start, s.recording.gyro.front().stamp_ns, options);
 }
 
 }  // namespace camgyro

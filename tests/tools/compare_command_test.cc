@@ -198,9 +198,8 @@ TEST(MakeInput, DrawsStartsFromThePrior) {
   const int kRuns = 200;
   for (int i = 0; i < kRuns; ++i) {
     const Input input = MakeInput(from, static_cast<uint64_t>(i), StartKind::kDrawn).value();
-    EXPECT_EQ(Difference(input.start, input.prior).norm(), 0.0);
-    const StateVector z =
-        Difference(input.start, input.truth).cwiseQuotient(input.prior.prior_sigma);
+    EXPECT_EQ(Difference(input.start, input.prior.mean).norm(), 0.0);
+    const StateVector z = Difference(input.start, input.truth).cwiseQuotient(input.prior.sigma);
     sum += z;
     sum_sq += z.cwiseAbs2();
   }
@@ -208,7 +207,7 @@ TEST(MakeInput, DrawsStartsFromThePrior) {
   EXPECT_LT((sum_sq / kRuns - StateVector::Ones()).cwiseAbs().maxCoeff(),
             4.0 * std::sqrt(2.0 / kRuns));
   const Input input = MakeInput(from, 0, StartKind::kDrawn).value();
-  EXPECT_EQ(input.prior.prior_sigma, PaperStart(input.truth).prior_sigma);
+  EXPECT_EQ(input.prior.sigma, PaperStart(input.truth).sigma);
 }
 
 TEST(MakeInput, ExactMatchesAreThoseWithoutNoise) {

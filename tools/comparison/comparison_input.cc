@@ -5,7 +5,6 @@
 #include <random>
 #include <utility>
 
-#include "core/so3.h"
 #include "core/time.h"
 #include "estimator/calibrate.h"
 #include "estimator/reference/implicit_ekf.h"
@@ -33,24 +32,16 @@ std::string NameOf(const fs::path& path) {
   return name.extension() == ".yaml" ? name.stem().string() : name.string();
 }
 
-Calibration DrawStart(const Calibration& truth, uint64_t seed) {
-  Calibration start = truth;
-  start.prior_sigma = PaperStart(truth).prior_sigma;
+Prior DrawStart(const Calibration& truth, uint64_t seed) {
+  const StateVector sigma = PaperStart(truth).sigma;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   StateVector d;
-  for (int i = 0; i < kStateSize; ++i) d[i] = start.prior_sigma[i] * normal(random);
-  start.lens[kFocal] += d[kStateFocal];
-  start.lens[kCx] += d[kStateCx];
-  start.lens[kCy] += d[kStateCy];
-  start.readout_s += d[kStateReadout];
-  start.delay_s += d[kStateDelay];
-  start.bias_gyro_rad_s += d.segment<3>(kStateBias);
-  start.q_gyro_cam = start.q_gyro_cam * Exp(Eigen::Vector3d(d.segment<3>(kStateRotation)));
-  return start;
+  for (int i = 0; i < kStateSize; ++i) d[i] = sigma[i] * normal(random);
+  return {Moved(truth, d), sigma};
 }
 
-Result<Calibration> DeclaredStart(const Recording& recording, const Calibration& truth) {
+Result<Prior> DeclaredStart(const Recording& recording, const Calibration& truth) {
   const CameraGuess& declared = recording.camera;
   if (!declared.focal_px || !declared.q_gyro_cam) {
     return BadInput(recording.path + ": --start=declared needs a focal length and a mounting, " +
@@ -59,11 +50,12 @@ Result<Calibration> DeclaredStart(const Recording& recording, const Calibration&
   Calibration guess = truth;
   guess.lens[kFocal] = *declared.focal_px;
   guess.q_gyro_cam = *declared.q_gyro_cam;
-  Calibration start = PaperStart(guess);
+  Prior prior = PaperStart(guess);
+  Calibration& start = prior.mean;
   if (declared.principal_px) start.lens.segment<2>(kCx) = *declared.principal_px;
   if (declared.readout_s) start.readout_s = *declared.readout_s;
   if (declared.delay_s) start.delay_s = *declared.delay_s;
-  return start;
+  return prior;
 }
 
 Status FindStartOf(Input* input) {
@@ -72,7 +64,7 @@ Status FindStartOf(Input* input) {
       FindStartAndFocal(recording, RotationsFrom(recording), StartOptions(), FocalScanOptions());
   if (!found) return tl::unexpected(found.error());
   input->prior = MakePrior(recording, *found);
-  input->start = input->prior;
+  input->start = input->prior.mean;
   input->start.bias_gyro_rad_s = found->bias_gyro_rad_s;
   if (found->focal && found->focal->determined) {
     input->start.lens[kFocal] = found->focal->value_px;
@@ -182,12 +174,12 @@ Result<Input> MakeInput(const Case& from, uint64_t run, StartKind start) {
     return input;
   }
   const uint64_t seed = (from.scenario ? from.scenario->seed : 0) + run;
-  const Result<Calibration> chosen = start == StartKind::kDrawn
-                                         ? Result<Calibration>(DrawStart(input.truth, seed))
-                                         : DeclaredStart(input.recording, input.truth);
+  const Result<Prior> chosen = start == StartKind::kDrawn
+                                   ? Result<Prior>(DrawStart(input.truth, seed))
+                                   : DeclaredStart(input.recording, input.truth);
   if (!chosen) return tl::unexpected(chosen.error());
-  input.start = *chosen;
   input.prior = *chosen;
+  input.start = input.prior.mean;
   return input;
 }
 

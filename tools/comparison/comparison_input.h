@@ -46,7 +46,7 @@ struct Input {
   Recording recording;
   Calibration truth;
   Calibration start;  // values to begin with
-  Calibration prior;  // centre, and prior_sigma
+  Prior prior;
   // Scenarios only: the noise of the tracks, and the matches without noise, outliers and moving
   // points, one entry per pair of neighbouring frames.
   double noise_px = 0.0;

@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "tools/comparison/format.h"
-#include "tools/comparison/parameter_units.h"
 
 namespace camgyro::comparison {
 namespace {
@@ -108,11 +107,11 @@ std::string CaseTable(const CaseResult& result) {
                    "bias", "in 3 s", "frames");
     for (size_t i = 0; i < kStateSize; ++i) {
       const ParameterStatistics& p = s.parameters[i];
-      const ParameterUnit& unit = ParameterUnits()[i];
-      text += Format("    %-4s%-8s", unit.label, unit.unit) + Cell(unit.scale * p.rmse, 9) +
-              Cell(unit.scale * p.bound, 9) + Cell(p.rmse / p.bound, 9) +
-              Cell(unit.scale * p.sigma, 9) + Cell(p.bias_sigmas, 9) +
-              Format("%7.0f %%", 100.0 * p.within_3_sigma) +
+      const StateParameter& unit = StateTable()[i];
+      text += Format("    %-4s%-8s", unit.symbol, unit.error_unit) +
+              Cell(unit.error_scale * p.rmse, 9) + Cell(unit.error_scale * p.bound, 9) +
+              Cell(p.rmse / p.bound, 9) + Cell(unit.error_scale * p.sigma, 9) +
+              Cell(p.bias_sigmas, 9) + Format("%7.0f %%", 100.0 * p.within_3_sigma) +
               (std::isfinite(p.frames_to_converge) ? Format("%9.0f\n", p.frames_to_converge)
                                                    : Format("%9s\n", "-"));
     }
@@ -143,13 +142,13 @@ std::string ComparisonMarkdown(const std::vector<CaseResult>& results) {
     }
     text += "\n" + heads + "\n" + rules + "\n";
     for (size_t i = 0; i < kStateSize; ++i) {
-      const ParameterUnit& unit = ParameterUnits()[i];
-      const double bound = unit.scale * result.statistics.front().parameters[i].bound;
-      text += Format("| %s [%s] | ", unit.label, unit.unit) + Cell(bound, 0) + " |";
+      const StateParameter& unit = StateTable()[i];
+      const double bound = unit.error_scale * result.statistics.front().parameters[i].bound;
+      text += Format("| %s [%s] | ", unit.symbol, unit.error_unit) + Cell(bound, 0) + " |";
       for (const EstimatorStatistics& s : result.statistics) {
         const ParameterStatistics& p = s.parameters[i];
         text += s.runs == 0 ? std::string(" - |")
-                            : " " + Cell(unit.scale * p.rmse, 0) + " (" +
+                            : " " + Cell(unit.error_scale * p.rmse, 0) + " (" +
                                   Cell(p.rmse / p.bound, 0) + "; " + Cell(p.bias_sigmas, 0) + "; " +
                                   (std::isfinite(p.frames_to_converge)
                                        ? Format("%.0f", p.frames_to_converge)

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "tools/comparison/format.h"
-#include "tools/comparison/parameter_units.h"
 
 namespace camgyro::comparison {
 namespace {
@@ -67,12 +66,13 @@ class Panel {
     return top_ + 0.5 * height_ * (1.0 - std::clamp(share, -1.0, 1.0));
   }
 
-  std::string Axes(const ParameterUnit& unit, bool with_frames) const {
+  std::string Axes(const StateParameter& unit, bool with_frames) const {
     std::string svg = Format(
         "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"none\" "
         "stroke=\"#9ca3af\"/>\n",
         left_, top_, width_, height_);
-    svg += TextAt(left_, top_ - 8, "font-size=\"12\"", Label(unit.label) + " [" + unit.unit + "]");
+    svg += TextAt(left_, top_ - 8, "font-size=\"12\"",
+                  Label(unit.symbol) + " [" + unit.error_unit + "]");
     double labelled_y = 1e9;  // of the last label above zero; those below mirror it
     std::vector<double> ticks = {0.0};
     for (double power = std::pow(10.0, std::floor(std::log10(0.3 * linear_))); power < largest_;
@@ -184,17 +184,18 @@ std::string Legend(double x, double y, const SeedRun& run) {
 }
 
 std::string DrawPanel(double x, double y, int parameter, double last_frame, const SeedRun& run) {
-  const ParameterUnit& unit = ParameterUnits()[static_cast<size_t>(parameter)];
+  const StateParameter& unit = StateTable()[static_cast<size_t>(parameter)];
   // The linear part holds the best final +-3 sigma.
   double linear = 1e300, largest = 0.0;
   for (const EstimatorRun& e : run.estimators) {
     if (!e.failure.empty()) continue;
-    linear = std::min(linear, 3.0 * unit.scale * std::sqrt(e.covariance(parameter, parameter)));
+    linear =
+        std::min(linear, 3.0 * unit.error_scale * std::sqrt(e.covariance(parameter, parameter)));
     for (const TracePoint& point : e.trace) {
-      largest = std::max({largest, unit.scale * std::abs(point.error[parameter]),
-                          3.0 * unit.scale * point.sigma[parameter]});
+      largest = std::max({largest, unit.error_scale * std::abs(point.error[parameter]),
+                          3.0 * unit.error_scale * point.sigma[parameter]});
     }
-    largest = std::max(largest, unit.scale * std::abs(e.error[parameter]));
+    largest = std::max(largest, unit.error_scale * std::abs(e.error[parameter]));
   }
   largest = 1.1 * std::max(largest, linear);
   const Panel panel(x, y, last_frame, linear, largest);
@@ -204,16 +205,17 @@ std::string DrawPanel(double x, double y, int parameter, double last_frame, cons
     if (!e.failure.empty()) continue;
     const char* color = ColorOf(e.estimator);
     if (e.trace.empty()) {
-      errors += panel.Mark(unit.scale * e.error[parameter],
-                           3.0 * unit.scale * std::sqrt(e.covariance(parameter, parameter)), color);
+      errors +=
+          panel.Mark(unit.error_scale * e.error[parameter],
+                     3.0 * unit.error_scale * std::sqrt(e.covariance(parameter, parameter)), color);
       continue;
     }
     Line error, above, below;
     for (const size_t i : Selection(e.trace.size())) {
       const TracePoint& point = e.trace[i];
-      error.points.emplace_back(point.frame, unit.scale * point.error[parameter]);
-      above.points.emplace_back(point.frame, 3.0 * unit.scale * point.sigma[parameter]);
-      below.points.emplace_back(point.frame, -3.0 * unit.scale * point.sigma[parameter]);
+      error.points.emplace_back(point.frame, unit.error_scale * point.error[parameter]);
+      above.points.emplace_back(point.frame, 3.0 * unit.error_scale * point.sigma[parameter]);
+      below.points.emplace_back(point.frame, -3.0 * unit.error_scale * point.sigma[parameter]);
     }
     svg += panel.Band(above, color);
     const char* thin = "stroke-width=\"0.8\" stroke-opacity=\"0.7\"";
@@ -223,7 +225,7 @@ std::string DrawPanel(double x, double y, int parameter, double last_frame, cons
   if (!run.bound.empty()) {
     Line above, below;
     for (const size_t i : Selection(run.bound.size())) {
-      const double half = 3.0 * unit.scale * std::sqrt(run.bound[i](parameter, parameter));
+      const double half = 3.0 * unit.error_scale * std::sqrt(run.bound[i](parameter, parameter));
       above.points.emplace_back(i + 1, half);
       below.points.emplace_back(i + 1, -half);
     }

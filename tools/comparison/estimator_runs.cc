@@ -112,7 +112,6 @@ void RunRefinement(const Input& input, const EstimationInput& data, const PairGr
     from = window_trace.back().estimate;
     options.graph.sigma_px = window_trace.back().noise_px;
   }
-  from.prior_sigma = input.prior.prior_sigma;
   std::optional<Result<Refined>> refined;
   Measure([&] { refined = Refine(data, data.pairs, from, input.prior, options); }, run);
   if (*refined) {
@@ -146,8 +145,7 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
   for (const std::string& name : names) {
     EstimatorRun run;
     if (name == "ekf") {
-      Calibration start = input.start;
-      start.prior_sigma = input.prior.prior_sigma;
+      const Prior start{input.start, input.prior.sigma};
       EkfRun result;
       const EstimationInput neighbours = MakeEstimationInput(input.recording);
       Measure([&] { result = RunEkf(neighbours, input.recording.frames, start, ekf); }, &run);

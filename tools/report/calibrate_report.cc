@@ -11,7 +11,7 @@ constexpr size_t kMaxResidualPairs = 600;  // for the maps; spread over longer r
 
 // The calibration that the fit started from: what the files declare and the delay search found.
 Calibration StartOf(const Recording& recording, const StartResult& start) {
-  Calibration calibration = MakePrior(recording, start);
+  Calibration calibration = MakePrior(recording, start).mean;
   calibration.bias_gyro_rad_s = start.bias_gyro_rad_s;
   return calibration;
 }

@@ -182,7 +182,7 @@ ReportSection MotionSection(const Recording& recording, const CalibrationReport&
   table.header = {"parameter", "known before, ±", "now, ±", "unit", "times better", "determined"};
   std::vector<std::string> advice;
   for (const ParameterRow& row : rows) {
-    const double before = row.unit_scale * c.prior_sigma[row.index];
+    const double before = row.unit_scale * report.prior.sigma[row.index];
     table.rows.push_back({{row.name, "", 0.0},
                           {FormatText("%.3g", before), "", 0.0},
                           {FormatText("%.2g", row.sigma), "", 0.0},

@@ -34,9 +34,9 @@ Diagnosis Find(const Recording& recording, double focal_px = 650.0,
   input.start.readout_s = 0.0167;
   input.start.q_gyro_cam =
       simulation::MountOptions::DefaultRotation() * Exp(Eigen::Vector3d(0.01, -0.01, 0.01));
-  input.prior = input.fit = input.start;
-  input.prior.prior_sigma << 0.15 * focal_px, 17.0, 17.0, 0.02, 0.05,
-      Eigen::Vector3d::Constant(0.1), Eigen::Vector3d::Constant(0.15);
+  input.prior.mean = input.fit = input.start;
+  input.prior.sigma << 0.15 * focal_px, 17.0, 17.0, 0.02, 0.05, Eigen::Vector3d::Constant(0.1),
+      Eigen::Vector3d::Constant(0.15);
   input.graph.match_noise = recording.match_noise;
   input.graph.gyro_sigma_rad_s = GyroSigma(recording, input.start.delay_s);
   Diagnosis diagnosis;

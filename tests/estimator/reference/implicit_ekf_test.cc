@@ -32,10 +32,10 @@ Simulated RunningScene(double duration_s, double noise_px) {
 }
 
 // Off the truth by about one of the paper's standard deviations in everything.
-Calibration StartNear(const Calibration& truth) {
-  Calibration start = truth;
-  start.prior_sigma = PaperStart(truth).prior_sigma;
-  const StateVector& sigma = start.prior_sigma;
+Prior StartNear(const Calibration& truth) {
+  Prior prior{truth, PaperStart(truth).sigma};
+  Calibration& start = prior.mean;
+  const StateVector& sigma = prior.sigma;
   start.lens[kFocal] += sigma[kStateFocal];
   start.lens[kCx] -= sigma[kStateCx];
   start.lens[kCy] += sigma[kStateCy];
@@ -43,7 +43,7 @@ Calibration StartNear(const Calibration& truth) {
   start.delay_s -= sigma[kStateDelay];
   start.bias_gyro_rad_s += Vector3d(1, -1, 1).cwiseProduct(sigma.segment<3>(kStateBias));
   start.q_gyro_cam = start.q_gyro_cam * Exp(Vector3d(-0.0134, 0.0134, 0.0134));
-  return start;
+  return prior;
 }
 
 // A filter that has read the whole gyro and made one prediction and update with the first pair.
@@ -68,14 +68,15 @@ TEST(PaperStart, IsSectionVC) {
   guess.height_px = 480;
   guess.lens = MakePinhole(650.0, {300.0, 200.0});
   guess.delay_s = 1.0;
-  const Calibration start = PaperStart(guess);
+  const Prior prior = PaperStart(guess);
+  const Calibration& start = prior.mean;
   EXPECT_EQ(start.lens[kFocal], 650.0);
   EXPECT_EQ(start.lens[kCx], 359.5);
   EXPECT_EQ(start.lens[kCy], 239.5);
   EXPECT_EQ(start.readout_s, 0.0275);
   EXPECT_EQ(start.delay_s, 0.0);
   EXPECT_TRUE(start.bias_gyro_rad_s.isZero(0.0));
-  const ImplicitEkf filter(start, {});
+  const ImplicitEkf filter(prior, {});
   VectorXd sigma(12);
   sigma << 20, 6.67, 6.67, 0.00167, 0.01, 0.0067, 0.0067, 0.0067, 0.0067, 0.0067, 0.0067, 0.0067;
   EXPECT_LT((filter.covariance().diagonal().cwiseSqrt() - sigma).norm(), 1e-12);
@@ -139,8 +140,7 @@ TEST(ImplicitEkf, MeasurementVanishesAtTheTruth) {
   scenario.gyro.rate_hz = 1000.0;
   const Simulated s = simulation::SimulateTracks(scenario).value();
   const EstimationInput input = MakeEstimationInput(s.recording);
-  Calibration truth = s.truth;
-  truth.prior_sigma = PaperStart(truth).prior_sigma;
+  const Prior truth{s.truth, PaperStart(s.truth).sigma};
   EkfOptions options;
   options.gate_sigmas = 1e-9;
   ImplicitEkf filter(truth, options);
@@ -281,7 +281,7 @@ TEST(ImplicitEkf, IterationsHelpFarFromTheTruth) {
     const EkfRun run =
         RunEkf(MakeEstimationInput(s.recording), s.recording.frames, StartNear(s.truth), options);
     return Difference(run.trace.back().estimate, s.truth)
-        .cwiseQuotient(PaperStart(s.truth).prior_sigma)
+        .cwiseQuotient(PaperStart(s.truth).sigma)
         .norm();
   };
   EXPECT_LT(final_error(5), final_error(1));
@@ -291,8 +291,7 @@ TEST(ImplicitEkf, IterationsHelpFarFromTheTruth) {
 TEST(ImplicitEkf, GateDropsGrossOutliers) {
   const Simulated s = RunningScene(0.3, 0.05);
   const EstimationInput input = MakeEstimationInput(s.recording);
-  Calibration start = s.truth;
-  start.prior_sigma = 0.01 * PaperStart(s.truth).prior_sigma;
+  const Prior start{s.truth, 0.01 * PaperStart(s.truth).sigma};
   const auto moved_sigmas = [&](double gate, double off_px) {
     EkfOptions options;
     options.triplets = 1;
@@ -307,7 +306,7 @@ TEST(ImplicitEkf, GateDropsGrossOutliers) {
     pair.matches[2].px_b -= Eigen::Vector2d(off_px, 0.5 * off_px);
     EXPECT_EQ(filter.Update(pair.time_a_s, pair.time_b_s, pair.matches),
               ImplicitEkf::UpdateResult::kUpdated);
-    return Difference(filter.Estimate(), start).cwiseQuotient(start.prior_sigma).norm();
+    return Difference(filter.Estimate(), start.mean).cwiseQuotient(start.sigma).norm();
   };
   EXPECT_GT(moved_sigmas(0.0, 100.0), 0.01);
   EXPECT_EQ(moved_sigmas(3.0, 100.0), 0.0);

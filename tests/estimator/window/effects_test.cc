@@ -137,11 +137,12 @@ INSTANTIATE_TEST_SUITE_P(
 
 // One pixel without a ray leaves a pair without residuals, and a solve without a start.
 TEST(EffectOfALens, LeavesOutPixelsWithoutARayIfAsked) {
-  Calibration start;
+  Prior prior;
+  Calibration& start = prior.mean;
   start.width_px = 640;
   start.height_px = 480;
   start.lens = MakePinhole(400.0, {319.5, 239.5});
-  start.prior_sigma.setOnes();
+  prior.sigma.setOnes();
   const Result<EffectSet> effects = MakeEffects("radial_distortion:radtan", EffectSetup());
   ASSERT_TRUE(effects) << effects.error().message;
   start.effects = std::make_shared<const EffectSet>(*effects);
@@ -154,7 +155,7 @@ TEST(EffectOfALens, LeavesOutPixelsWithoutARayIfAsked) {
   for (const bool drop : {false, true}) {
     PairGraphOptions options;
     options.drop_without_ray = drop;
-    PairGraph graph(start, start, options);
+    PairGraph graph(start, prior, options);
     for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {0.3, 0.1, 0.0}});
     ASSERT_EQ(graph.AddPair(0, {0.2}, {0.2 + 1.0 / 30.0}, matches), AddPairResult::kAdded);
     EXPECT_EQ(graph.Residuals(0, false).size(), drop ? 11U : 0U);

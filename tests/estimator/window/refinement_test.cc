@@ -20,8 +20,8 @@ using simulation::SimulateTracks;
 using ::testing::HasSubstr;
 
 Result<Refined> RefineFromOffTheTruth(const Simulated& s, const EstimationInput& input) {
-  const Calibration start = StartOffTheTruth(s.truth);
-  return Refine(input, input.pairs, start, start, {});
+  const Prior start = StartOffTheTruth(s.truth);
+  return Refine(input, input.pairs, start.mean, start, {});
 }
 
 // A scenario of which this share of the matches is wrong: both observations must be right.
@@ -72,10 +72,10 @@ TEST(Refinement, NoiseAlongTheMotionIsNoBiasIfItIsKnown) {
       match.noise_factor_b << L(0, 0), L(1, 0), L(1, 1);
     }
   }
-  const Calibration start = StartOffTheTruth(s.truth);
+  const Prior start = StartOffTheTruth(s.truth);
   RefinementOptions options;
   options.graph.match_noise = MatchNoise::kSecondImage;
-  const Result<Refined> known = Refine(input, input.pairs, start, start, options);
+  const Result<Refined> known = Refine(input, input.pairs, start.mean, start, options);
   ASSERT_TRUE(known.has_value()) << known.error().message;
   EXPECT_NEAR(known->quality.noise_px, 0.25, 0.01);
   const StateVector error = ErrorInSigmas(known->calibration, s.truth);
@@ -83,7 +83,7 @@ TEST(Refinement, NoiseAlongTheMotionIsNoBiasIfItIsKnown) {
   for (TimedPair& pair : input.pairs) {
     for (Match& match : pair.matches) match.noise_factor_b << 1.0, 0.0, 1.0;
   }
-  const Result<Refined> alike = Refine(input, input.pairs, start, start, options);
+  const Result<Refined> alike = Refine(input, input.pairs, start.mean, start, options);
   ASSERT_TRUE(alike.has_value()) << alike.error().message;
   EXPECT_GT(ErrorInSigmas(alike->calibration, s.truth).cwiseAbs().maxCoeff(), 5.0);
 }
@@ -103,10 +103,10 @@ TEST(Refinement, StepsThatTurnThePathAreNoBias) {
     scenario.tracks.noise_px = 0.3;
     const Simulated s = SimulateTracks(scenario).value();
     const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
-    const Calibration start = StartOffTheTruth(s.truth);
+    const Prior start = StartOffTheTruth(s.truth);
     RefinementOptions options;
     const auto error = [&] {
-      const Result<Refined> refined = Refine(input, input.pairs, start, start, options);
+      const Result<Refined> refined = Refine(input, input.pairs, start.mean, start, options);
       EXPECT_TRUE(refined.has_value()) << refined.error().message;
       return refined ? ErrorInSigmas(refined->calibration, s.truth)[kStateReadout] / 3.0 : 0.0;
     };
@@ -142,8 +142,8 @@ TEST(Refinement, TransferRecoversTheTruthOfAFarSceneOnly) {
   options.graph.residual = ResidualKind::kSymmetricTransfer;
   Simulated s = SimulateTracks(FarScenario(4.0)).value();
   EstimationInput input = MakeEstimationInput(s.recording);
-  Calibration start = StartOffTheTruth(s.truth);
-  const Result<Refined> far = Refine(input, input.pairs, start, start, options);
+  Prior start = StartOffTheTruth(s.truth);
+  const Result<Refined> far = Refine(input, input.pairs, start.mean, start, options);
   ASSERT_TRUE(far.has_value()) << far.error().message;
   EXPECT_TRUE(far->converged);
   EXPECT_EQ(far->quality.pairs, 120);
@@ -161,14 +161,14 @@ TEST(Refinement, TransferRecoversTheTruthOfAFarSceneOnly) {
 
   // No direction takes degrees of freedom: with four lost of 20, the noise would be 12 % larger.
   for (TimedPair& pair : input.pairs) pair.matches.resize(10);
-  const Result<Refined> few = Refine(input, input.pairs, start, start, options);
+  const Result<Refined> few = Refine(input, input.pairs, start.mean, start, options);
   ASSERT_TRUE(few.has_value()) << few.error().message;
   EXPECT_NEAR(few->quality.noise_px, 0.7, 0.04);
 
   s = SimulateTracks(ShortScenario(4.0)).value();
   input = MakeEstimationInput(s.recording);
   start = StartOffTheTruth(s.truth);
-  const Result<Refined> near = Refine(input, input.pairs, start, start, options);
+  const Result<Refined> near = Refine(input, input.pairs, start.mean, start, options);
   ASSERT_TRUE(near.has_value()) << near.error().message;
   EXPECT_GT(near->quality.noise_px, 1.0);  // parallax of the median match
   EXPECT_GT(ErrorInSigmas(near->calibration, s.truth).cwiseAbs().maxCoeff(), 10.0);
@@ -177,15 +177,15 @@ TEST(Refinement, TransferRecoversTheTruthOfAFarSceneOnly) {
 // What has no transfer is left out when a pair is added: one wrong match of a fast turn, by 80 deg
 // here, must not stop the whole fit.
 TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
-  Calibration start;
-  start.width_px = 640;
-  start.height_px = 480;
-  start.lens = MakePinhole(500.0, {319.5, 239.5});
-  start.prior_sigma.setOnes();
+  Prior start;
+  start.mean.width_px = 640;
+  start.mean.height_px = 480;
+  start.mean.lens = MakePinhole(500.0, {319.5, 239.5});
+  start.sigma.setOnes();
   PairGraphOptions options;
   options.residual = ResidualKind::kSymmetricTransfer;
   const auto residuals_of = [&](int wrong) {
-    PairGraph graph(start, start, options);
+    PairGraph graph(start.mean, start, options);
     for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {42.0, 0.0, 0.0}});
     std::vector<Match> matches;
     for (int i = 0; i < 10; ++i) matches.push_back({{60.0 * i, 239.5}, {60.0 * i, 239.5}});
@@ -221,11 +221,10 @@ TEST(PairGraph, DirectionsWithoutParallaxWidenTheSigmas) {
     scenario.tracks.count = 100;
     const Simulated s = SimulateTracks(scenario).value();
     const EstimationInput input = MakeEstimationInput(s.recording);
-    Calibration prior = s.truth;
-    prior.prior_sigma.setOnes();
+    const Prior prior{s.truth, StateVector::Ones()};
     PairGraphOptions options;
     options.sigma_px = 0.7;
-    PairGraph graph(prior, prior, options);
+    PairGraph graph(prior.mean, prior, options);
     for (const TimedRate& rate : input.rates) graph.AddRate(rate);
     CrossFit sum;
     for (const TimedPair& pair : input.pairs) {
@@ -254,12 +253,12 @@ TEST(Refinement, WithoutLossWrongMatchesPull) {
     const bool far = kind == ResidualKind::kSymmetricTransfer;
     const Simulated s = WithWrongMatches(far ? FarScenario(4.0) : ShortScenario(4.0), 0.05);
     const EstimationInput input = MakeEstimationInput(s.recording);
-    const Calibration start = StartOffTheTruth(s.truth);
+    const Prior start = StartOffTheTruth(s.truth);
     RefinementOptions options;
     options.graph.residual = kind;
-    const Result<Refined> robust = Refine(input, input.pairs, start, start, options);
+    const Result<Refined> robust = Refine(input, input.pairs, start.mean, start, options);
     options.graph.robust_threshold = 0.0;
-    const Result<Refined> plain = Refine(input, input.pairs, start, start, options);
+    const Result<Refined> plain = Refine(input, input.pairs, start.mean, start, options);
     ASSERT_TRUE(robust.has_value()) << robust.error().message;
     ASSERT_TRUE(plain.has_value()) << plain.error().message;
     const StateVector sigma = robust->calibration.sigma();
@@ -277,19 +276,19 @@ TEST(Refinement, FewerThanTenPairsAreRefused) {
   const Simulated s = SimulateTracks(ShortScenario(0.5)).value();
   EstimationInput input = MakeEstimationInput(s.recording);
   ASSERT_EQ(input.pairs.size(), 15u);
-  const Calibration start = StartOffTheTruth(s.truth);
+  const Prior start = StartOffTheTruth(s.truth);
   const std::vector<TimedPair> nine(input.pairs.begin(), input.pairs.begin() + 9);
-  const Result<Refined> few = Refine(input, nine, start, start, {});
+  const Result<Refined> few = Refine(input, nine, start.mean, start, {});
   ASSERT_FALSE(few.has_value());
   EXPECT_EQ(few.error().kind, ErrorKind::kCannotEstimate);
   EXPECT_THAT(few.error().message, HasSubstr("only 9 pairs"));
   // Fifteen pairs, of which six have too few matches.
   for (size_t i = 0; i < 6; ++i) input.pairs[2 * i].matches.resize(7);
-  const Result<Refined> poor = Refine(input, input.pairs, start, start, {});
+  const Result<Refined> poor = Refine(input, input.pairs, start.mean, start, {});
   ASSERT_FALSE(poor.has_value());
   EXPECT_EQ(poor.error().kind, ErrorKind::kCannotEstimate);
   // None at all.
-  const Result<Refined> none = Refine(input, {}, start, start, {});
+  const Result<Refined> none = Refine(input, {}, start.mean, start, {});
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error().kind, ErrorKind::kCannotEstimate);
 }

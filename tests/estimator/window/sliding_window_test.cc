@@ -49,12 +49,10 @@ TEST(SlidingWindow, FindsTheTruthWithinItsSigmasAndAgreesWithTheRefinement) {
   EXPECT_LT(last.estimate.sigma().tail<3>().maxCoeff(), 9e-3);
 
   const EstimationInput input = MakeEstimationInput(s.recording);
-  Calibration from = last.estimate;
-  const Calibration prior = StartOffTheTruth(s.truth);
-  from.prior_sigma = prior.prior_sigma;
+  const Prior prior = StartOffTheTruth(s.truth);
   RefinementOptions options;
   options.graph.sigma_px = last.noise_px;
-  const Result<Refined> refined = Refine(input, input.pairs, from, prior, options);
+  const Result<Refined> refined = Refine(input, input.pairs, last.estimate, prior, options);
   ASSERT_TRUE(refined.has_value()) << refined.error().message;
   // Both use the same data: they may differ by a fraction of what each is uncertain.
   const StateVector gap =
@@ -245,7 +243,7 @@ TEST(SlidingWindow, WhatTheMotionDoesNotDetermineKeepsItsPrior) {
       [&](const WindowUpdate& update) { sigmas.push_back(update.estimate.sigma()); });
   FeedAll(s.recording, &window);
   ASSERT_GT(sigmas.size(), 12u);  // an unsettled window is solved every 10 of 149 pairs
-  const StateVector prior = StartOffTheTruth(s.truth).prior_sigma;
+  const StateVector prior = StartOffTheTruth(s.truth).sigma;
   const StateVector last = sigmas.back();
   RecordProperty("focal_share", std::to_string(last[kStateFocal] / prior[kStateFocal]));
   RecordProperty("roll_share",

@@ -42,7 +42,7 @@ Exact MakeExact(Scenario scenario) {
   scenario.gyro.accelerometer = false;
   Exact exact = {simulation::SimulateTracks(scenario).value(), {}, {}};
   exact.pairs = PairsFromTracks(exact.s.recording.tracks, 1);
-  exact.prior_sigma = PaperStart(exact.s.truth).prior_sigma;
+  exact.prior_sigma = PaperStart(exact.s.truth).sigma;
   return exact;
 }
 
