@@ -4,6 +4,7 @@
 
 #include "camgyro/calibrator.h"
 #include "camgyro/version.h"
+#include "core/standard_distortion.h"
 
 namespace camgyro {
 namespace {

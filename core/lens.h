@@ -80,16 +80,6 @@ const Lens& GetLens(DistortionModel model);
 // "none", "radtan", "kannala_brandt": the value of `distortion: model:` in calibration.yaml.
 std::string DistortionModelName(DistortionModel model);
 
-// A lens in the four coefficients that other programs know.
-struct DistortionCoefficients {
-  DistortionModel model = DistortionModel::kNone;
-  Eigen::Vector4d k = Eigen::Vector4d::Zero();  // of `model`
-  Eigen::Matrix<double, 4, kLensSize> by_lens;  // derivative of k
-};
-// Of a pinhole with kb: the Kannala-Brandt lens that is nearest to it, along the rays of a picture
-// of this size (rms; a tangential part is left out).
-DistortionCoefficients StandardDistortion(DistortionModel model, const LensParameters& lens,
-                                          const Eigen::Vector2d& size_px);
 // Where a model's four coefficients begin in the lens block.
 inline LensIndex FirstCoefficient(DistortionModel model) {
   return model == DistortionModel::kKannalaBrandt ? kKb1 : kK1;

@@ -115,7 +115,9 @@ struct Recording {
   std::vector<std::string> notes;
 
   // No pixels: attitudes made elsewhere are all there is of the camera.
-  bool HasOnlyAttitudes() const { return matches.empty() && tracks.empty() && !HasImages(); }
+  bool HasOnlyAttitudes() const {
+    return matches.empty() && tracks.empty() && !HasImages() && !q_cam_world.empty();
+  }
   bool HasImages() const {
     return !video_file.empty() || (!frames.empty() && !frames.front().image_file.empty());
   }
@@ -124,10 +126,6 @@ struct Recording {
 // Matches between frames i and i + gap from tracks: every track seen in both.
 std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,
                                        int gap);
-
-// Which samples stay at the gyro's full scale: the largest magnitude of an axis, if it is taken far
-// more often than values just below it.
-std::vector<bool> FindSaturated(const std::vector<GyroSample>& gyro);
 
 // Median interval of strictly increasing stamps [s]; 0 with fewer than two.
 double MedianInterval(const std::vector<GyroSample>& gyro);

@@ -5,9 +5,9 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <future>
 
+#include "core/format.h"
 #include "core/so3.h"
 
 namespace camgyro {
@@ -28,12 +28,6 @@ class StageClock {
   std::vector<StageTime>* times_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
-
-std::string Format(const char* format, double a, double b = 0.0, double c = 0.0, double d = 0.0) {
-  char text[300];
-  std::snprintf(text, sizeof(text), format, a, b, c, d);
-  return text;
-}
 
 std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
   std::vector<CameraRotation> rotations;
@@ -218,7 +212,7 @@ Prior MakePrior(const Recording& recording, const StartResult& start) {
     sigma[static_cast<Eigen::Index>(i)] =
         (declared[i] ? parameter.declared_sigma : parameter.usual_sigma).In(scales);
   }
-  if (recording.tracks.empty() && recording.matches.empty()) {
+  if (recording.HasOnlyAttitudes()) {
     // An attitude has neither pixels nor rows: nothing depends on the lens, and the readout is 0.
     prior.readout_s = 0.0;
     prior.delay_s = start.delay_middle_row_s;
@@ -254,7 +248,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   CalibrationReport report;
   report.residual = options.residual;
   StageClock clock(&report.times);
-  const bool attitudes = recording.matches.empty() && recording.tracks.empty();
+  const bool attitudes = recording.HasOnlyAttitudes();
   const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
 
   tell("start", 0.0);

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "core/format.h"
 #include "core/robust_statistics.h"
 #include "frontend/frame_source.h"
 #include "frontend/gyro_rotation.h"
@@ -122,10 +123,10 @@ Status CheckImageMotion(const Recording& recording) {
   const ImageMotion motion = MeasureImageMotion(recording);
   if (motion.matches >= kMinMatches && motion.motion_px >= kMinMotionPx) return {};
   if (motion.matches >= kMinMatches) {
-    char px[20];
-    std::snprintf(px, sizeof px, "%.2f px", motion.motion_px);
-    return CannotEstimate(std::string("no motion in the recording: features move by ") + px +
-                          " between frames (median); turn the camera about all its axes");
+    return CannotEstimate(
+        Format("no motion in the recording: features move by %.2f px between frames (median); turn "
+               "the camera about all its axes",
+               motion.motion_px));
   }
   return CannotEstimate(
       "too few features: a median of " + std::to_string(static_cast<int>(motion.matches)) +

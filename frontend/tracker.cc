@@ -6,6 +6,7 @@
 #include <opencv2/video/tracking.hpp>
 #include <optional>
 
+#include "core/robust_statistics.h"
 #include "frontend/patch_alignment.h"
 
 namespace camgyro {
@@ -181,9 +182,7 @@ std::vector<Eigen::Vector3d> KltTracker::NoiseFactors(
     for (const Eigen::Matrix2d& covariance : covariances) {
       variances.push_back(0.5 * covariance.trace());
     }
-    const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
-    std::nth_element(variances.begin(), middle, variances.end());
-    reference_ = *middle;
+    reference_ = MedianInPlace(&variances);
   }
   for (size_t i = 0; i < covariances.size(); ++i) {
     const Eigen::Matrix2d covariance =

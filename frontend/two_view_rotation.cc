@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "frontend/outliers.h"
 
@@ -27,9 +28,7 @@ struct Motion {
 // Median absolute residual as a standard deviation, corrected for the parameters fitted.
 double SpreadOf(std::vector<double> squared, int num_parameters) {
   const auto n = static_cast<double>(squared.size());
-  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
-  std::nth_element(squared.begin(), middle, squared.end());
-  return 1.4826 * std::sqrt(*middle * n / (n - num_parameters));
+  return kSigmaOfMedian * std::sqrt(MedianInPlace(&squared) * n / (n - num_parameters));
 }
 
 // Loss of a squared residual s: c^2 u / (1 + u), u = s / c^2 (Geman and McClure). Bounded, because

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/standard_distortion.h"
 #include "estimator/calibrate.h"
 #include "estimator/vins/initialise.h"
 #include "frontend/camera_rotations.h"

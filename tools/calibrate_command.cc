@@ -82,7 +82,7 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
                              *recording->declared_stabilisation + ")");
   }
 
-  const bool attitudes = HasOnlyAttitudes(*recording);
+  const bool attitudes = recording->HasOnlyAttitudes();
   files.Add("trace.csv", TraceCsv(report->trace));
   files.Add("delay.csv", DelayCsv(report->start.curve));
   const std::string yaml = CalibrationYaml(*report, attitudes);

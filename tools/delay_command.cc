@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "core/format.h"
 #include "estimator/start/axis_permutation.h"
 #include "estimator/start/find_start.h"
 #include "estimator/start/focal_scan.h"
@@ -38,9 +39,7 @@ std::string Plot(const std::vector<DelayResidual>& curve) {
   }
   std::string plot;
   for (int row = kPlotHeight; row >= 0; --row) {
-    char label[20] = "          ";
-    if (row % 3 == 0) std::snprintf(label, sizeof label, "%8.0f %% ", 100.0 * row / kPlotHeight);
-    plot += label;
+    plot += row % 3 == 0 ? Format("%8.0f %% ", 100.0 * row / kPlotHeight) : std::string(10, ' ');
     std::string line;
     for (const double value : columns) {
       line += static_cast<int>(std::lround(value * kPlotHeight)) == row ? '*' : ' ';
@@ -48,9 +47,8 @@ std::string Plot(const std::vector<DelayResidual>& curve) {
     line.erase(line.find_last_not_of(' ') + 1);
     plot += "|" + line + "\n";
   }
-  char axis[200];
-  std::snprintf(axis, sizeof axis, "%11s%-*.3f%*.3f s\n", "", kPlotWidth / 2, first, kPlotWidth / 2,
-                last);
+  const std::string axis =
+      Format("%11s%-*.3f%*.3f s\n", "", kPlotWidth / 2, first, kPlotWidth / 2, last);
   return plot + std::string(10, ' ') + "+" + std::string(kPlotWidth, '-') + "\n" + axis;
 }
 
@@ -87,7 +85,7 @@ Result<DelayReport> FindDelay(const Recording& recording, ProgressBar* bar) {
   bar->Show("delay", 0.0);
   std::vector<CameraRotation> rotations;
   Result<StartResult> start = CannotEstimate("");
-  if (HasOnlyAttitudes(recording)) {
+  if (recording.HasOnlyAttitudes()) {
     rotations = CameraRotationsFromAttitudes(recording.q_cam_world, 1);
     start = FindStart(recording, rotations, options);
   } else {

@@ -46,7 +46,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
     diagnosis = Diagnose(*recording, RotationsFrom(*recording), options,
                          [&](const std::string& stage, double done) { bar.Show(stage, done); });
   }
-  const bool attitudes = HasOnlyAttitudes(*recording);
+  const bool attitudes = recording->HasOnlyAttitudes();
   files.Add("diagnosis.yaml", DiagnosisYaml(diagnosis));
   if (diagnosis.before) {
     const std::string yaml = CalibrationYaml(diagnosis.result(), attitudes);

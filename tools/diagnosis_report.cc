@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/format.h"
 #include "tools/diagnosis_file.h"
 #include "tools/report/calibrate_report.h"
 #include "tools/report/charts.h"
@@ -49,9 +50,9 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
   for (size_t i = 0; i < d.rounds.size(); ++i) {
     const DiagnosisRound& round = d.rounds[i];
     if (round.added.empty()) {
-      rounds.rows.push_back(Row({FormatText("%zu", i + 1), NothingAddedText(round), "", "",
-                                 FormatText("%.3f", scale * round.before.rms_px),
-                                 FormatText("%.3f", round.before.chi2), "", ""}));
+      rounds.rows.push_back(Row({Format("%zu", i + 1), NothingAddedText(round), "", "",
+                                 Format("%.3f", scale * round.before.rms_px),
+                                 Format("%.3f", round.before.chi2), "", ""}));
       continue;
     }
     const CandidateResult& c = round.candidates.front();
@@ -59,25 +60,25 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
     for (Eigen::Index k = 0; k < std::min<Eigen::Index>(4, c.estimate.size()); ++k) {
       if (k >= c.sigma.size()) break;
       const EffectParameter& p = c.parameter_info[static_cast<size_t>(k)];
-      parameters += FormatText("%s%s %.4g ± %.2g %s", k > 0 ? "; " : "", p.name.c_str(),
-                               c.estimate[k], c.sigma[k], p.unit.c_str());
+      parameters += Format("%s%s %.4g ± %.2g %s", k > 0 ? "; " : "", p.name.c_str(), c.estimate[k],
+                           c.sigma[k], p.unit.c_str());
     }
     rounds.rows.push_back(
-        Row({FormatText("%zu", i + 1),
+        Row({Format("%zu", i + 1),
              c.name + " (" + c.shape + "): " + FindEffect(c.name)->explanation, parameters,
-             c.tried_anyway ? "without it, the model is far off" : FormatText("%.2g", c.p_value),
-             FormatText("%.3f → %.3f", scale * round.before.rms_px, scale * round.after.rms_px),
-             FormatText("%.3f → %.3f", round.before.chi2, round.after.chi2),
-             FormatText("%.0f ± %.0f", round.report_gain.sum, round.report_gain.sigma),
+             c.tried_anyway ? "without it, the model is far off" : Format("%.2g", c.p_value),
+             Format("%.3f → %.3f", scale * round.before.rms_px, scale * round.after.rms_px),
+             Format("%.3f → %.3f", round.before.chi2, round.after.chi2),
+             Format("%.0f ± %.0f", round.report_gain.sum, round.report_gain.sigma),
              FindEffect(c.name)->advice}));
   }
   if (!d.rounds.empty()) {
-    html += Paragraph(
-                FormatText("Fitted on %d pairs of frames, chosen by %d others, reported on "
-                           "%d others, which neither the fit nor the choice has seen%s.",
-                           d.fit_pairs, d.choice_pairs, d.report_pairs,
-                           d.report_shares_tracks ? " (tracks go on from one to the other)" : "")) +
-            TableHtml(rounds);
+    html +=
+        Paragraph(Format("Fitted on %d pairs of frames, chosen by %d others, reported on "
+                         "%d others, which neither the fit nor the choice has seen%s.",
+                         d.fit_pairs, d.choice_pairs, d.report_pairs,
+                         d.report_shares_tracks ? " (tracks go on from one to the other)" : "")) +
+        TableHtml(rounds);
   }
   for (const auto& names : d.indistinguishable) {
     html += Paragraph("This motion cannot tell apart: " + Joined(names) + ".");
@@ -115,17 +116,16 @@ ReportSection MapsSection(const Diagnosis& d) {
         maps.push_back(std::move(drawn));
       }
       const Calibration& c = d.result().calibration;
-      html +=
-          ImageMapsHtml("map-image", FormatText("shift over the image, p = %.2g", after.p_value),
-                        maps, c.width_px, c.height_px, after.unit);
+      html += ImageMapsHtml("map-image", Format("shift over the image, p = %.2g", after.p_value),
+                            maps, c.width_px, c.height_px, after.unit);
       continue;
     }
     const size_t inner = after.shape.size() == 2 ? 3 : 1;
     for (size_t part = 0; part < inner; ++part) {
       LineChart chart;
-      chart.id = FormatText("map-%zu-%zu", m, part);
+      chart.id = Format("map-%zu-%zu", m, part);
       chart.title = after.name + (inner == 3 ? std::string(", about gyro ") + "xyz"[part] : "") +
-                    FormatText(" (p = %.2g)", after.p_value);
+                    Format(" (p = %.2g)", after.p_value);
       chart.x_label = after.axis_unit;
       chart.y_label = after.unit;
       chart.x = after.axis;

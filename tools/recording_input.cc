@@ -2,9 +2,9 @@
 
 #include <gflags/gflags.h>
 
-#include <cstdio>
 #include <utility>
 
+#include "core/format.h"
 #include "core/time.h"
 #include "frontend/camera_rotations.h"
 #include "frontend/readers/read_recording.h"
@@ -41,13 +41,8 @@ Result<Recording> OpenRecording(const std::string& path) {
   return recording;
 }
 
-bool HasOnlyAttitudes(const Recording& recording) {
-  return recording.tracks.empty() && recording.matches.empty() && !recording.HasImages() &&
-         !recording.q_cam_world.empty();
-}
-
 Result<TrackingSummary> EnsureImageMotion(ProgressBar* progress, Recording* recording) {
-  if (HasOnlyAttitudes(*recording)) return TrackingSummary{};
+  if (recording->HasOnlyAttitudes()) return TrackingSummary{};
   if (recording->tracks.empty() && recording->matches.empty()) {
     return TrackRecording(
         {}, nullptr, [&](double done) { progress->Show("tracking", done); }, recording);
@@ -72,7 +67,6 @@ tl::unexpected<Error> Refusal(const Recording& recording, Error error) {
 }
 
 std::string DescribeRecording(const Recording& recording) {
-  char text[300];
   const double frame_s = MedianInterval(recording.frames), gyro_s = MedianInterval(recording.gyro);
   const double span_s =
       SecondsSince(recording.frames.front().stamp_ns, recording.frames.back().stamp_ns);
@@ -81,10 +75,9 @@ std::string DescribeRecording(const Recording& recording) {
     size = std::to_string(recording.camera.width_px) + " x " +
            std::to_string(recording.camera.height_px) + ", ";
   }
-  std::snprintf(text, sizeof text, "%s%zu frames in %.1f s (%.1f Hz), gyro %.0f Hz", size.c_str(),
+  return Format("%s%zu frames in %.1f s (%.1f Hz), gyro %.0f Hz", size.c_str(),
                 recording.frames.size(), span_s, frame_s > 0.0 ? 1.0 / frame_s : 0.0,
                 gyro_s > 0.0 ? 1.0 / gyro_s : 0.0);
-  return text;
 }
 
 }  // namespace camgyro

@@ -19,9 +19,6 @@ std::vector<std::string> GuessFlags();
 
 Result<Recording> OpenRecording(const std::string& path);
 
-// Pixels or attitudes? Attitudes are what a recording without any image motion is left with.
-bool HasOnlyAttitudes(const Recording& recording);
-
 // Tracks the pictures if the recording has neither tracks nor matches nor attitudes. Errors also if
 // there are too few features. The summary is empty where nothing had to be tracked.
 Result<TrackingSummary> EnsureImageMotion(ProgressBar* progress, Recording* recording);

@@ -11,6 +11,8 @@
 #include <sstream>
 #include <system_error>
 
+#include "core/standard_distortion.h"
+
 namespace camgyro {
 namespace {
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "core/format.h"
 #include "frontend/readers/read_recording.h"
 #include "tools/commands.h"
 #include "tools/read_calibration.h"
@@ -54,24 +55,18 @@ Result<StabilizeOptions> OptionsFromFlags() {
   return options;
 }
 
-std::string Text(const char* format, double a, double b = 0.0, double c = 0.0) {
-  char text[300];
-  std::snprintf(text, sizeof text, format, a, b, c);
-  return text;
-}
-
 std::string RegistrationRow(const char* name, double recorded, const double* unsynchronised,
                             double calibrated) {
-  return Text((std::string("  ") + name + " %8.3f px").c_str(), recorded) +
-         (unsynchronised != nullptr ? Text("      %8.3f px", *unsynchronised)
+  return Format("  %s %8.3f px", name, recorded) +
+         (unsynchronised != nullptr ? Format("      %8.3f px", *unsynchronised)
                                     : "               - ") +
-         Text("   %8.3f px   (as recorded is %.1f times that)\n", calibrated,
-              recorded / calibrated);
+         Format("   %8.3f px   (as recorded is %.1f times that)\n", calibrated,
+                recorded / calibrated);
 }
 
 std::string Summary(const StabilizeReport& report) {
-  std::string text = Text(
-      "\nneighbouring frames lie on each other within (medians of %.0f pairs)\n", report.pairs);
+  std::string text = Format(
+      "\nneighbouring frames lie on each other within (medians of %d pairs)\n", report.pairs);
   text += "                            as recorded   t_d = t_r = 0    calibrated\n";
   const auto& zero = report.unsynchronised;
   text += RegistrationRow("each turned by the gyro  ", report.as_recorded.turned_px,
@@ -79,21 +74,21 @@ std::string Summary(const StabilizeReport& report) {
   text += RegistrationRow("by the best homography   ", report.as_recorded.homography_px,
                           zero ? &zero->homography_px : nullptr, report.calibrated.homography_px);
   if (!zero) text += "  (-: with a delay of 0 the frames are outside of the gyro's time)\n";
-  text += Text("\nvideo      %.0f frames", report.frames) +
-          Text(", %.0f x %.0f", report.width_px, report.height_px) + ", sound: " + report.sound +
+  text += Format("\nvideo      %d frames", report.frames) +
+          Format(", %d x %d", report.width_px, report.height_px) + ", sound: " + report.sound +
           "\n";
   if (report.frames_dropped > 0) {
-    text += Text(
-        "           %.0f frames at the ends lie outside of the gyro's time and are left "
+    text += Format(
+        "           %d frames at the ends lie outside of the gyro's time and are left "
         "out\n",
         report.frames_dropped);
   }
   if (report.border_share > 0.0) {
-    text += Text("           borders show in %.0f %% of the frames: more --zoom hides them\n",
-                 100.0 * report.border_share);
+    text += Format("           borders show in %.0f %% of the frames: more --zoom hides them\n",
+                   100.0 * report.border_share);
   }
-  return text + Text("time       %.1f s, %.0f frames/s, %.1f times real time\n", report.seconds,
-                     report.frames / report.seconds, report.video_seconds / report.seconds);
+  return text + Format("time       %.1f s, %.0f frames/s, %.1f times real time\n", report.seconds,
+                       report.frames / report.seconds, report.video_seconds / report.seconds);
 }
 
 Status RunStabilize(const std::vector<std::string>& arguments) {

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <sstream>
 #include <vector>
 
+#include "core/format.h"
 #include "estimator/start/axis_permutation.h"
 #include "tools/report/parameter_rows.h"
 
@@ -14,15 +13,6 @@ namespace camgyro {
 namespace {
 
 constexpr size_t kWidth = 96;
-
-__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
-  char text[400];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
 
 std::string TableRow(const ParameterRow& row) {
   const int decimals = DecimalsFor(row.sigma);

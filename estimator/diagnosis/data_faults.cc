@@ -3,25 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
 #include "core/effects/catalogue.h"
+#include "core/format.h"
 #include "core/robust_statistics.h"
+#include "core/saturation.h"
 #include "core/so3.h"
 #include "core/time.h"
 
 namespace camgyro {
 namespace {
-
-__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
-  char text[400];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
 
 // Gaps longer than 1.5 intervals: how many, how many steps are missing, where the longest is.
 struct Gaps {

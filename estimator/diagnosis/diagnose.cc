@@ -10,7 +10,7 @@ namespace {
 // Rotations of the camera, whatever the recording has.
 std::vector<CameraRotation> CameraRotationsIn(const Recording& recording,
                                               const CameraRotationsAtFocal& rotations_at) {
-  if (recording.matches.empty() && recording.tracks.empty()) {
+  if (recording.HasOnlyAttitudes()) {
     std::vector<CameraRotation> rotations;
     for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
       rotations.push_back(pair.rotation);
@@ -67,7 +67,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   diagnosis.before = *before;
 
   const CalibrationReport& report = *diagnosis.before;
-  const bool attitudes = recording.matches.empty() && recording.tracks.empty();
+  const bool attitudes = recording.HasOnlyAttitudes();
   LoopInput input;
   input.recording = &recording;
   input.prior = MakePrior(recording, report.start);

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <string>
 
 #include "core/effects/catalogue.h"
+#include "core/format.h"
 #include "core/robust_statistics.h"
 #include "estimator/diagnosis/pair_scores.h"
 
@@ -44,9 +44,7 @@ struct PairCosts {
 }  // namespace
 
 std::string DelayStepShape(double time_s) {
-  char shape[40];
-  std::snprintf(shape, sizeof shape, "%.4f", std::floor(1e4 * time_s) * 1e-4);
-  return shape;
+  return Format("%.4f", std::floor(1e4 * time_s) * 1e-4);
 }
 
 bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,

@@ -32,7 +32,7 @@ Result<CalibrationReport> CalibrateWithEkf(const Recording& recording,
                                            const CameraRotationsAtFocal& rotations_at,
                                            const CalibrateOptions& options,
                                            const EkfOptions& ekf_options) {
-  if (recording.matches.empty() && recording.tracks.empty()) {
+  if (recording.HasOnlyAttitudes()) {
     return CannotEstimate("the filter needs image motion, and this recording has attitudes only");
   }
   const auto begin = std::chrono::steady_clock::now();

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "core/format.h"
 #include "core/time.h"
 #include "estimator/start/axis_permutation.h"
 #include "estimator/start/lag_search.h"
@@ -20,14 +20,9 @@ constexpr double kGoodFit = 0.9;  // explained; below, a note
 constexpr double kDegreesPerRadian = 57.29577951308232;
 constexpr double kUnitTolerance = 1.2;
 
-std::string Text(const char* format, double value) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, format, value);
-  return buffer;
-}
-std::string Seconds(double value) { return Text("%.3f s", value); }
-std::string Percent(double fraction) { return Text("%.0f %%", 100.0 * fraction); }
-std::string Rate(double value) { return Text("%.3g rad/s", value); }
+std::string Seconds(double value) { return Format("%.3f s", value); }
+std::string Percent(double fraction) { return Format("%.0f %%", 100.0 * fraction); }
+std::string Rate(double value) { return Format("%.3g rad/s", value); }
 
 enum class Outcome { kTrusted, kNotFound, kDoesNotFollow, kRefused };
 
@@ -62,7 +57,7 @@ Verdict Judge(const LagSearch& search, double gyro_noise_rad_s, double delay_off
                 ", which is left-handed)"};
   }
   if (explained >= options.min_explained && IsFactor(fit.rate_ratio, kDegreesPerRadian)) {
-    return {Outcome::kRefused, "gyro in deg/s? Its rates are " + Text("%.1f", fit.rate_ratio) +
+    return {Outcome::kRefused, "gyro in deg/s? Its rates are " + Format("%.1f", fit.rate_ratio) +
                                    " times the camera's; rad/s are expected"};
   }
   if (explained < options.min_explained || search.on_edge) {
@@ -83,7 +78,7 @@ Verdict Judge(const LagSearch& search, double gyro_noise_rad_s, double delay_off
   }
   if (fit.rate_ratio > options.max_rate_ratio || fit.rate_ratio < 1.0 / options.max_rate_ratio) {
     return {Outcome::kRefused,
-            "the camera turns " + Text("%.2f", 1.0 / fit.rate_ratio) +
+            "the camera turns " + Format("%.2f", 1.0 / fit.rate_ratio) +
                 " times as fast as the gyro: wrong focal length, or electronically stabilised"};
   }
   if (search.runner_up_ratio > options.max_runner_up) {
@@ -92,7 +87,7 @@ Verdict Judge(const LagSearch& search, double gyro_noise_rad_s, double delay_off
                 Seconds(search.runner_up_lag_s + delay_offset_s) +
                 " fit equally (periodic or too slow motion, unexplained fractions differ by a "
                 "factor of " +
-                Text("%.2f", search.runner_up_ratio) + " only)"};
+                Format("%.2f", search.runner_up_ratio) + " only)"};
   }
   if (!search.fit.converged) {
     return {Outcome::kRefused,

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "core/robust_statistics.h"
 #include "core/time.h"
 #include "estimator/start/lag_search.h"
 #include "estimator/start/rate_alignment.h"
@@ -64,9 +65,7 @@ void Measure(const Recording& recording, const StartResult& near, double lag_s,
     point->blocks.push_back(cam.frame_a[i] * kBlocks / frames);
     point->gyro_power += cam.weight[i] * gyro_rate_cam.head<2>().squaredNorm();
   }
-  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::nth_element(norms.begin(), middle, norms.end());
-  point->noise_px_s = *middle / kMedianNorm2;
+  point->noise_px_s = MedianInPlace(&norms) / kMedianNorm2;
 }
 
 // Parabola y = c0 + c1 x + c2 x^2 through points (least squares); rows of coefficients per column

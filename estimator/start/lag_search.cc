@@ -5,6 +5,7 @@
 #include <numeric>
 #include <string>
 
+#include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "core/time.h"
 
@@ -18,13 +19,6 @@ constexpr int kMaxRounds = 3;
 constexpr double kFloor = 0.02;
 constexpr double kMaxRateRatio = 2.5;     // beyond, a fit of scale one has no meaning
 constexpr double kMaxWeightRatio = 10.0;  // of one pair against the median pair
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 size_t BestIndex(const std::vector<LagPoint>& curve) {
   return static_cast<size_t>(std::max_element(curve.begin(), curve.end(),
@@ -55,7 +49,7 @@ void FindRunnerUp(size_t best, LagSearch* search) {
   const std::vector<LagPoint>& curve = search->curve;
   std::vector<double> all;
   for (const LagPoint& point : curve) all.push_back(point.explained);
-  const double half_way = 0.5 * (curve[best].explained + Median(all));
+  const double half_way = 0.5 * (curve[best].explained + MedianOr(all, 0.0));
   size_t low = best, high = best;
   while (low > 0 && curve[low].explained > half_way) --low;
   while (high + 1 < curve.size() && curve[high].explained > half_way) ++high;
@@ -80,7 +74,7 @@ LagSearch SearchLag(const RateAlignment& alignment, double first_lag_s, double l
   for (int i = 0; i < alignment.camera().size(); ++i) {
     intervals.push_back(alignment.camera().interval_s(i));
   }
-  const double step_s = std::clamp(kStepIntervals * Median(intervals), kMinStepS, kMaxStepS);
+  const double step_s = std::clamp(kStepIntervals * MedianOr(intervals, 0.0), kMinStepS, kMaxStepS);
 
   Eigen::VectorXd weight;  // none at first
   double previous_lag_s = 0.0;
@@ -154,7 +148,7 @@ Result<CameraRates> MakeCameraRates(const Recording& recording,
     too_fast += rates.back().norm() > fastest ? 1 : 0;
   }
   const bool drop = 2 * too_fast < static_cast<int>(rates.size());
-  const double usual_sigma = sigmas.empty() ? 1.0 : Median(sigmas);
+  const double usual_sigma = MedianOr(sigmas, 1.0);
 
   std::vector<size_t> order(rates.size());
   std::iota(order.begin(), order.end(), size_t{0});
@@ -174,7 +168,7 @@ Result<CameraRates> MakeCameraRates(const Recording& recording,
     const double sqrt_weight = interval_s / std::hypot(sigma, gyro.Noise(interval_s) * interval_s);
     weights.push_back(sqrt_weight * sqrt_weight);
   }
-  const double usual_weight = Median(weights);
+  const double usual_weight = MedianOr(weights, 0.0);
   camera.omega_cam_rad_s.resize(3, static_cast<Eigen::Index>(kept.size()));
   camera.weight.resize(static_cast<Eigen::Index>(kept.size()));
   for (size_t i = 0; i < kept.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/robust_statistics.h"
 #include "core/time.h"
 
 namespace camgyro {
@@ -35,10 +36,7 @@ RateAlignment::RateAlignment(GyroRates gyro, CameraRates camera)
   const size_t n = gyro_.times_s.size();
   std::vector<double> intervals;
   for (size_t k = 1; k < n; ++k) intervals.push_back(gyro_.times_s[k] - gyro_.times_s[k - 1]);
-  std::vector<double> sorted = intervals;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                   sorted.end());
-  const double hole_s = std::max(kMaxGyroGapSamples * sorted[sorted.size() / 2], kMaxGyroGapS);
+  const double hole_s = std::max(kMaxGyroGapSamples * MedianOr(intervals, 0.0), kMaxGyroGapS);
 
   integral_ = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(n));
   gaps_.assign(n, 0);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/robust_statistics.h"
 #include "core/rotation_chain.h"
 #include "core/so3.h"
 
@@ -111,13 +112,6 @@ double SystematicFraction(const std::vector<Linearized>& lines, const Eigen::Vec
   return std::clamp(correlation, 0.0, 1.0) * squares / sum_w / power;
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 StartFit FitStart(const RateAlignment& alignment, double lag_s,
@@ -147,9 +141,9 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
       rates.push_back(lines[i].residual.norm());
     }
     // The floor is for data without any noise.
-    const double scale = std::max(Median(norms) / kMedianNorm3, 1e-9);
+    const double scale = std::max(MedianOr(norms, 0.0) / kMedianNorm3, 1e-9);
     unit_variance = scale * scale;
-    fit.noise_rad_s = Median(rates) / kMedianNorm3;
+    fit.noise_rad_s = MedianOr(rates, 0.0) / kMedianNorm3;
 
     normal.setZero();
     Vector gradient = Vector::Zero();

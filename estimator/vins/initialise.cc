@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <utility>
 
+#include "core/format.h"
 #include "estimator/vins/alignment.h"
 #include "estimator/vins/structure.h"
 #include "estimator/vins/vins_refinement.h"
@@ -23,15 +22,6 @@ constexpr double kMaxGravityErrorMS2 = 3.0;
 constexpr double kMaxAccelNoiseFactor = 15.0;
 constexpr double kMinInlierRatio = 0.5;
 constexpr double kMaxNoiseRad = 5e-3;  // of a tracked point: 3 px at 600 px of focal length
-
-[[gnu::format(printf, 1, 2)]] std::string Format(const char* format, ...) {
-  va_list arguments;
-  va_start(arguments, format);
-  char text[400];
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
 
 // Mean specific force of each interval between keyframes, in the world frame.
 Eigen::Matrix3Xd MeanForces(const VinsWindow& window) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/robust_statistics.h"
+#include "core/saturation.h"
 #include "core/time.h"
 
 namespace camgyro {

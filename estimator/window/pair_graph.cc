@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "estimator/window/pair_blocks.h"
 #include "estimator/window/pair_view.h"
@@ -103,8 +104,7 @@ void PairGraph::AddRate(const TimedRate& rate) {
   samples_.push_back(rate);
   if (samples_.size() == 50 || (samples_.size() < 50 && samples_.size() >= 3)) {
     std::vector<double> intervals = Intervals(samples_);
-    std::nth_element(intervals.begin(), intervals.begin() + intervals.size() / 2, intervals.end());
-    median_interval_s_ = intervals[intervals.size() / 2];
+    median_interval_s_ = MedianInPlace(&intervals);
   }
 }
 

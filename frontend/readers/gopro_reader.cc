@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/robust_statistics.h"
 #include "core/time.h"
 #include "frontend/readers/gpmf.h"
 #include "frontend/readers/mp4_box.h"
@@ -184,10 +185,8 @@ void NoteGyroClock(const SensorSamples& gyro, Recording* recording) {
              " Hz; payload times deviate from it by up to ", 1e3 * gyro.clock.largest_deviation_s,
              " ms (payload ", gyro.clock.largest_deviation_lump, ")"));
 
-  std::vector<size_t> sorted = gyro.counts;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                   sorted.end());
-  const auto usual = static_cast<double>(sorted[sorted.size() / 2]);
+  std::vector<size_t> counts = gyro.counts;
+  const auto usual = static_cast<double>(MedianInPlace(&counts));
   // The last payload ends with the recording and may be short.
   for (size_t i = 0; i + 1 < gyro.counts.size(); ++i) {
     if (std::abs(static_cast<double>(gyro.counts[i]) - usual) > 0.05 * usual) {
@@ -292,9 +291,7 @@ Result<Recording> ReadGoPro(const std::string& file) {
   std::vector<double> readouts_ms = CollectScalars(*payloads, "SROT");
   if (settings.readout_ms) readouts_ms = {*settings.readout_ms};
   if (!readouts_ms.empty()) {
-    const auto middle = readouts_ms.begin() + static_cast<std::ptrdiff_t>(readouts_ms.size() / 2);
-    std::nth_element(readouts_ms.begin(), middle, readouts_ms.end());
-    recording.camera.readout_s = 1e-3 * *middle;
+    recording.camera.readout_s = 1e-3 * MedianInPlace(&readouts_ms);
   }
   if (video->display_rotation_deg != 0) {
     recording.notes.push_back(Concat("the video is to be shown rotated by ",

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/robust_statistics.h"
+
 namespace camgyro {
 
 Result<SampleClock> FitSampleClock(const std::vector<SampleLump>& lumps) {
@@ -43,11 +45,8 @@ Result<SampleClock> FitSampleClock(const std::vector<SampleLump>& lumps) {
 
     std::vector<double> deviations;
     for (const SampleLump& lump : lumps) deviations.push_back(deviation(clock, lump));
-    std::vector<double> sorted = deviations;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    constexpr double kSigmaOfMedian = 1.4826;  // for a normal distribution
-    const double bound = 1.5 * std::max(kSigmaOfMedian * *middle, clock.interval_s);
+    const double usual = kSigmaOfMedian * MedianOr(deviations, 0.0);
+    const double bound = 1.5 * std::max(usual, clock.interval_s);
     for (size_t i = 0; i < lumps.size(); ++i) {
       weights[i] = deviations[i] <= bound ? 1.0 : bound / deviations[i];
     }

@@ -71,7 +71,7 @@ Status BenchmarkDelaySearch(const std::string& name, const Recording& recording,
     const double middle = MedianInPlace(&delays_ms);
     std::vector<double> off;
     for (const double delay : delays_ms) off.push_back(std::abs(delay - middle));
-    const double spread = 1.4826 * MedianInPlace(&off);
+    const double spread = kSigmaOfMedian * MedianInPlace(&off);
     const StateCovariance& C = calibrated.covariance;
     const double sigma_ms =
         1e3 * std::sqrt(C(kStateDelay, kStateDelay) + C(kStateDelay, kStateReadout) +

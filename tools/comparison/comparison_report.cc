@@ -6,7 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "tools/comparison/format.h"
+#include "core/format.h"
 
 namespace camgyro::comparison {
 namespace {

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "tools/comparison/format.h"
+#include "core/format.h"
 
 namespace camgyro::comparison {
 namespace {

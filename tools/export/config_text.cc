@@ -2,7 +2,7 @@
 
 #include <glog/logging.h>
 
-#include <cstdio>
+#include "core/format.h"
 
 namespace camgyro {
 
@@ -65,11 +65,7 @@ std::map<std::string, std::string> CommonValues(const ExportInput& input) {
   return values;
 }
 
-std::string Number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.10g", value == 0.0 ? 0.0 : value);
-  return text;
-}
+std::string Number(double value) { return Format("%.10g", value == 0.0 ? 0.0 : value); }
 
 std::string List(const std::vector<double>& values) {
   std::string text = "[";

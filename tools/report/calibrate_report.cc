@@ -30,7 +30,7 @@ std::vector<TimedPair> Spread(std::vector<TimedPair> pairs) {
 Result<std::vector<ReportSection>> CalibrationSections(const Recording& recording,
                                                        const CalibrationReport& report,
                                                        const RunInfo& run) {
-  const bool attitudes = recording.matches.empty() && recording.tracks.empty();
+  const bool attitudes = recording.HasOnlyAttitudes();
   const Calibration& calibration = report.calibration;
   std::vector<ReportSection> sections = {
       SummarySection(report, attitudes), MotionSection(recording, report, attitudes),

@@ -12,6 +12,7 @@ extern "C" {
 #include <cmath>
 #include <opencv2/core/version.hpp>
 
+#include "core/format.h"
 #include "core/time.h"
 #include "estimator/start/axis_permutation.h"
 #include "tools/report/build_info.h"
@@ -111,7 +112,7 @@ Eigen::Vector3d RateRms(const Recording& recording, const Calibration& calibrati
 }
 
 std::string TimesText(double ratio) {
-  return ratio < 10.0 ? FormatText("%.1f", ratio) : FormatText("%.0f", ratio);
+  return ratio < 10.0 ? Format("%.1f", ratio) : Format("%.0f", ratio);
 }
 
 // Parameters of the effects in the model, in the units of calibration.yaml; empty without effects.
@@ -126,11 +127,11 @@ std::string EffectsTable(const Calibration& c) {
       const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
       const double value = c.effect_values[item.first + k];
       const double sigma = std::sqrt(c.effect_covariance(item.first + k, item.first + k));
-      const std::string key = FormatText("effects.%zu.parameters.%d.", i, k);
+      const std::string key = Format("effects.%zu.parameters.%d.", i, k);
       table.rows.push_back({{k == 0 ? item.entry->name : "", "", 0.0},
                             {p.name, "", 0.0},
-                            {FormatText("%.4g", value), key + "value", value},
-                            {FormatText("%.2g", sigma), key + "sigma", sigma},
+                            {Format("%.4g", value), key + "value", value},
+                            {Format("%.2g", sigma), key + "sigma", sigma},
                             {p.unit, "", 0.0}});
     }
   }
@@ -153,9 +154,9 @@ ReportSection SummarySection(const CalibrationReport& report, bool attitudes) {
     const YamlPlace& place = kYamlPlaces[static_cast<size_t>(row.index)];
     const bool mounting = row.index >= kStateRotation;  // its value in the file is a quaternion
     table.rows.push_back({{row.name, "", 0.0},
-                          {FormatText("%.*f", decimals, row.value),
+                          {Format("%.*f", decimals, row.value),
                            mounting ? "" : YamlKey(place, "value"), row.value / row.unit_scale},
-                          {FormatText("%.*f", decimals, row.sigma), YamlKey(place, place.sigma),
+                          {Format("%.*f", decimals, row.sigma), YamlKey(place, place.sigma),
                            row.sigma / row.unit_scale},
                           {row.unit, "", 0.0},
                           {row.determined ? "" : "not determined by this recording", "", 0.0}});
@@ -184,8 +185,8 @@ ReportSection MotionSection(const Recording& recording, const CalibrationReport&
   for (const ParameterRow& row : rows) {
     const double before = row.unit_scale * report.prior.sigma[row.index];
     table.rows.push_back({{row.name, "", 0.0},
-                          {FormatText("%.3g", before), "", 0.0},
-                          {FormatText("%.2g", row.sigma), "", 0.0},
+                          {Format("%.3g", before), "", 0.0},
+                          {Format("%.2g", row.sigma), "", 0.0},
                           {row.unit, "", 0.0},
                           {TimesText(before / row.sigma), "", 0.0},
                           {row.determined ? "yes" : "no", "", 0.0}});
@@ -193,7 +194,7 @@ ReportSection MotionSection(const Recording& recording, const CalibrationReport&
     if (!row.determined && (advice.empty() || advice.back() != text)) advice.push_back(text);
   }
   const Eigen::Vector3d rms = 57.29577951308232 * RateRms(recording, c);
-  std::string html = Paragraph(FormatText(
+  std::string html = Paragraph(Format(
       "The camera turned with %.0f deg/s about x (tilting up and down), %.0f about y (panning left "
       "and right), %.0f about z (rolling); root mean squares.",
       rms.x(), rms.y(), rms.z()));
@@ -271,15 +272,15 @@ ReportSection DelaySection(const StartResult& start) {
   chart.series = {series};
   chart.y_range = {{0.0, 130.0}};  // with room for the marks' names
   chart.marks = {
-      {start.delay_middle_row_s, FormatText("minimum %.1f ms", 1e3 * start.delay_middle_row_s)}};
+      {start.delay_middle_row_s, Format("minimum %.1f ms", 1e3 * start.delay_middle_row_s)}};
   const double factor = 1.0 / std::max(1e-3, start.runner_up_ratio);
   if (start.runner_up_ratio < 1.0) {
     chart.marks.push_back(
-        {start.runner_up_delay_s, FormatText("runner-up %.0f ms", 1e3 * start.runner_up_delay_s)});
+        {start.runner_up_delay_s, Format("runner-up %.0f ms", 1e3 * start.runner_up_delay_s)});
   }
   return {
       "delay", "Delay search",
-      Paragraph(FormatText(
+      Paragraph(Format(
           "At the minimum, %.2f ± %.2f ms, the camera's rotations explain %.0f %% of the gyro's "
           "motion. The next best delay leaves %s times as much unexplained: near 1 the choice "
           "would be a guess.",
@@ -296,38 +297,38 @@ ReportSection FitSection(const CalibrationReport& report, bool attitudes) {
   const std::string rms_key = attitudes ? "quality.rms_rad" : "quality.rms_px";
   const auto chi2 = [&](double rms) {
     const double ratio = rms / q.noise_px;
-    return TableCell{q.noise_px > 0.0 ? FormatText("%.2f", ratio * ratio) : "", "", 0.0};
+    return TableCell{q.noise_px > 0.0 ? Format("%.2f", ratio * ratio) : "", "", 0.0};
   };
   ReportTable table;
-  table.header = {"", "pairs", "matches", FormatText("rms [%s]", unit), "chi2 per residual"};
+  table.header = {"", "pairs", "matches", Format("rms [%s]", unit), "chi2 per residual"};
   if (q.matches > 0 || q.rms_px > 0.0) {
     table.rows.push_back({{"frames of the fit", "", 0.0},
-                          {FormatText("%d", q.pairs), "quality.pairs", double(q.pairs)},
-                          {FormatText("%d", q.matches), "quality.matches", double(q.matches)},
-                          {FormatText("%.4f", scale * q.rms_px), rms_key, q.rms_px},
+                          {Format("%d", q.pairs), "quality.pairs", double(q.pairs)},
+                          {Format("%d", q.matches), "quality.matches", double(q.matches)},
+                          {Format("%.4f", scale * q.rms_px), rms_key, q.rms_px},
                           chi2(q.rms_px)});
   }
   if (report.unseen) {
-    table.rows.push_back({{"frames not seen by the fit", "", 0.0},
-                          {FormatText("%d", report.unseen->pairs), "", 0.0},
-                          {FormatText("%d", report.unseen->matches), "", 0.0},
-                          {FormatText("%.4f", report.unseen->rms_px), "quality.unseen_rms_px",
-                           report.unseen->rms_px},
-                          chi2(report.unseen->rms_px)});
+    table.rows.push_back(
+        {{"frames not seen by the fit", "", 0.0},
+         {Format("%d", report.unseen->pairs), "", 0.0},
+         {Format("%d", report.unseen->matches), "", 0.0},
+         {Format("%.4f", report.unseen->rms_px), "quality.unseen_rms_px", report.unseen->rms_px},
+         chi2(report.unseen->rms_px)});
   }
   ReportTable noise;
   noise.header = {"", ""};
   noise.rows.push_back({{"noise of one coordinate", "", 0.0},
-                        {FormatText("%.4f %s", scale * q.noise_px, unit), noise_key, q.noise_px}});
+                        {Format("%.4f %s", scale * q.noise_px, unit), noise_key, q.noise_px}});
   if (q.inlier_ratio > 0.0) {
     noise.rows.push_back(
         {{"inliers", "", 0.0},
-         {FormatText("%.1f %%", 100.0 * q.inlier_ratio), "quality.inlier_ratio", q.inlier_ratio}});
+         {Format("%.1f %%", 100.0 * q.inlier_ratio), "quality.inlier_ratio", q.inlier_ratio}});
   }
   if (report.halves_chi2 > 0.0) {
     noise.rows.push_back(
         {{"disagreement of the two halves, chi2 per parameter (1 expected)", "", 0.0},
-         {FormatText("%.2f", report.halves_chi2), "", 0.0}});
+         {Format("%.2f", report.halves_chi2), "", 0.0}});
   }
   std::string html = (table.rows.empty() ? "" : TableHtml(table)) + TableHtml(noise);
   html += Paragraph(
@@ -346,7 +347,7 @@ ReportSection ReproductionSection(const RunInfo& run) {
       ", commit " + kGitCommit + "\nbuilt for   " + kPlatform + ", compiler " + __VERSION__ +
       "\nlibraries   Ceres " + CERES_VERSION_STRING + ", OpenCV " + CV_VERSION + ", FFmpeg " +
       av_version_info() + ", " +
-      FormatText("Eigen %d.%d.%d", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION) +
+      Format("Eigen %d.%d.%d", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION) +
       "\noptions    ";
   for (const auto& [name, value] : run.options) text += " --" + name + "=" + value;
   return {"reproduction", "To reproduce this",

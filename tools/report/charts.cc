@@ -8,6 +8,7 @@ extern "C" {
 #include <array>
 #include <cmath>
 
+#include "core/format.h"
 #include "tools/report/page.h"
 
 namespace camgyro {
@@ -27,7 +28,7 @@ std::string JsonNumbers(const std::vector<double>& values) {
   std::string json = "[";
   for (size_t i = 0; i < values.size(); ++i) {
     if (i > 0) json += ",";
-    json += std::isfinite(values[i]) ? FormatText("%.7g", values[i]) : "null";
+    json += std::isfinite(values[i]) ? Format("%.7g", values[i]) : "null";
   }
   return json + "]";
 }
@@ -50,7 +51,7 @@ std::string Colour(double share) {
   for (size_t i = 0; i < 3; ++i) {
     rgb[i] = std::lround((1.0 - weight) * kCividis[low][i] + weight * kCividis[low + 1][i]);
   }
-  return FormatText("#%02lx%02lx%02lx", rgb[0], rgb[1], rgb[2]);
+  return Format("#%02lx%02lx%02lx", rgb[0], rgb[1], rgb[2]);
 }
 
 struct MapScale {
@@ -83,14 +84,14 @@ std::string MapSvg(const ImageMap& map, double width, double height, const MapSc
                    const std::string& unit) {
   const double cell_x = width / static_cast<double>(map.value.cols());
   const double cell_y = height / static_cast<double>(map.value.rows());
-  std::string svg = FormatText("<svg viewBox=\"0 0 %g %g\" class=\"map\">", width, height);
+  std::string svg = Format("<svg viewBox=\"0 0 %g %g\" class=\"map\">", width, height);
   std::string arrows;
   for (Eigen::Index row = 0; row < map.value.rows(); ++row) {
     for (Eigen::Index col = 0; col < map.value.cols(); ++col) {
       const double value = map.value(row, col);
       const double x = cell_x * static_cast<double>(col), y = cell_y * static_cast<double>(row);
       if (!(value > 0.0)) continue;
-      svg += FormatText(
+      svg += Format(
           "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\"><title>%.3g "
           "%s</title></rect>",
           x, y, cell_x, cell_y, Colour(scale.Share(value)).c_str(), value, unit.c_str());
@@ -99,11 +100,11 @@ std::string MapSvg(const ImageMap& map, double width, double height, const MapSc
       const double dx = length * map.arrow_x(row, col), dy = length * map.arrow_y(row, col);
       if (!std::isfinite(dx)) continue;
       const double cx = x + 0.5 * cell_x, cy = y + 0.5 * cell_y;
-      const std::string line = FormatText("x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"",
-                                          cx - dx, cy - dy, cx + dx, cy + dy);
+      const std::string line = Format("x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"", cx - dx,
+                                      cy - dy, cx + dx, cy + dy);
       arrows += "<line class=\"halo\" " + line + "/><line class=\"arrow\" " + line + "/>" +
-                FormatText("<circle class=\"arrow\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>", cx + dx,
-                           cy + dy, 0.05 * std::min(cell_x, cell_y));
+                Format("<circle class=\"arrow\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>", cx + dx,
+                       cy + dy, 0.05 * std::min(cell_x, cell_y));
     }
   }
   return svg + arrows + "</svg>";
@@ -113,11 +114,11 @@ std::string ColourBar(const MapScale& scale, const std::string& unit) {
   constexpr int kSteps = 24;
   std::string svg = "<svg viewBox=\"0 0 240 12\" class=\"bar\">";
   for (int i = 0; i < kSteps; ++i) {
-    svg += FormatText("<rect x=\"%d\" y=\"0\" width=\"10.5\" height=\"12\" fill=\"%s\"/>", 10 * i,
-                      Colour((i + 0.5) / kSteps).c_str());
+    svg += Format("<rect x=\"%d\" y=\"0\" width=\"10.5\" height=\"12\" fill=\"%s\"/>", 10 * i,
+                  Colour((i + 0.5) / kSteps).c_str());
   }
-  return FormatText("<span>%.2g %s</span> ", scale.low, unit.c_str()) + svg + "</svg>" +
-         FormatText(" <span>%.2g %s (logarithmic)</span>", scale.high, unit.c_str());
+  return Format("<span>%.2g %s</span> ", scale.low, unit.c_str()) + svg + "</svg>" +
+         Format(" <span>%.2g %s (logarithmic)</span>", scale.high, unit.c_str());
 }
 
 std::string Base64(const std::vector<unsigned char>& bytes) {
@@ -136,12 +137,12 @@ std::string LineChartHtml(const LineChart& chart) {
                      ",\"logY\":" + (chart.log_y ? "true" : "false") +
                      ",\"group\":" + JsonText(chart.group);
   if (chart.y_range) {
-    json += FormatText(",\"yRange\":[%.7g,%.7g]", chart.y_range->first, chart.y_range->second);
+    json += Format(",\"yRange\":[%.7g,%.7g]", chart.y_range->first, chart.y_range->second);
   }
   json += ",\"marks\":[";
   for (const auto& [x, text] : chart.marks) {
-    json += (json.back() == '[' ? "" : ",") + FormatText("{\"x\":%.7g,\"text\":", x) +
-            JsonText(text) + "}";
+    json +=
+        (json.back() == '[' ? "" : ",") + Format("{\"x\":%.7g,\"text\":", x) + JsonText(text) + "}";
   }
   json += "],\"series\":[";
   for (const ChartSeries& series : chart.series) {
@@ -176,7 +177,7 @@ std::string ImageMapsHtml(const std::string& id, const std::string& caption,
   }
   html += "</div><p class=\"scale\">" + ColourBar(scale, unit);
   if (scale.arrow > 0.0) {
-    html += FormatText("; longest arrow: %.2g %s; dot: its head", scale.arrow, unit.c_str());
+    html += Format("; longest arrow: %.2g %s; dot: its head", scale.arrow, unit.c_str());
   }
   return html + "</p></figure>\n";
 }
@@ -186,10 +187,10 @@ std::string MatchesHtml(const std::string& id, const std::string& caption, doubl
                         const std::vector<DrawnMatch>& matches) {
   std::string html = "<figure class=\"matches\" id=\"" + id + "\"><figcaption>" +
                      EscapeHtml(caption) + "</figcaption>" +
-                     FormatText("<svg viewBox=\"0 0 %g %g\">", width_px, height_px);
+                     Format("<svg viewBox=\"0 0 %g %g\">", width_px, height_px);
   if (!jpeg.empty()) {
-    html += FormatText("<image width=\"%g\" height=\"%g\" preserveAspectRatio=\"none\" ", width_px,
-                       height_px) +
+    html += Format("<image width=\"%g\" height=\"%g\" preserveAspectRatio=\"none\" ", width_px,
+                   height_px) +
             "href=\"data:image/jpeg;base64," + Base64(jpeg) + "\"/>";
   }
   const double size = width_px / 200.0;
@@ -199,11 +200,11 @@ std::string MatchesHtml(const std::string& id, const std::string& caption, doubl
       if (match.inlier != inlier) continue;
       const double x = match.px_b.x(), y = match.px_b.y();
       html += inlier ? "<g class=\"inlier\">" : "<g class=\"outlier\">";
-      html += FormatText("<line x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>", match.px_a.x(),
-                         match.px_a.y(), x, y);
-      html += inlier ? FormatText("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>", x, y, 0.6 * size)
-                     : FormatText("<path d=\"M%.1f %.1fl%.1f %.1fm0 %.1fl%.1f %.1f\"/>", x - size,
-                                  y - size, 2 * size, 2 * size, -2 * size, -2 * size, 2 * size);
+      html += Format("<line x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>", match.px_a.x(),
+                     match.px_a.y(), x, y);
+      html += inlier ? Format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>", x, y, 0.6 * size)
+                     : Format("<path d=\"M%.1f %.1fl%.1f %.1fm0 %.1fl%.1f %.1f\"/>", x - size,
+                              y - size, 2 * size, 2 * size, -2 * size, -2 * size, 2 * size);
       html += "</g>";
     }
   }

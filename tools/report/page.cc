@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdarg>
-#include <cstdio>
 
+#include "core/format.h"
 #include "tools/report/assets.h"
 
 namespace camgyro {
@@ -16,15 +15,6 @@ bool LooksNumeric(const std::string& text) {
 }
 
 }  // namespace
-
-std::string FormatText(const char* format, ...) {
-  char text[1000];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
 
 std::string EscapeHtml(const std::string& text) {
   std::string escaped;
@@ -77,8 +67,8 @@ std::string TableHtml(const ReportTable& table) {
     for (const TableCell& cell : row) {
       html += LooksNumeric(cell.text) ? "<td class=\"number\"" : "<td";
       if (!cell.key.empty()) {
-        html += FormatText(" data-key=\"%s\" data-value=\"%.10g\"", EscapeHtml(cell.key).c_str(),
-                           cell.value);
+        html += Format(" data-key=\"%s\" data-value=\"%.10g\"", EscapeHtml(cell.key).c_str(),
+                       cell.value);
       }
       html += ">" + EscapeHtml(cell.text) + "</td>";
     }

@@ -41,9 +41,6 @@ struct ReportTable {
 // Cells that begin with a number are aligned to the right.
 std::string TableHtml(const ReportTable& table);
 
-// printf.
-__attribute__((format(printf, 1, 2))) std::string FormatText(const char* format, ...);
-
 }  // namespace camgyro
 
 #endif  // CAMGYRO_TOOLS_REPORT_PAGE_H_

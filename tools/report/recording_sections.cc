@@ -9,7 +9,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/format.h"
 #include "core/so3.h"
+#include "core/standard_distortion.h"
 #include "core/time.h"
 #include "estimator/window/estimation_input.h"
 #include "frontend/camera_rotations.h"
@@ -196,9 +198,9 @@ Result<ReportSection> MatchesSection(const Recording& recording,
                      recording.frames[static_cast<size_t>(pairs[index].second)].stamp_ns);
     section.html +=
         "<div>" +
-        MatchesHtml(FormatText("matches-%d", pairs[index].second),
-                    FormatText("Frame %d, at %.2f s: %zu inliers, %zu outliers",
-                               pairs[index].second, time_s, matches.size() - outliers, outliers),
+        MatchesHtml(Format("matches-%d", pairs[index].second),
+                    Format("Frame %d, at %.2f s: %zu inliers, %zu outliers", pairs[index].second,
+                           time_s, matches.size() - outliers, outliers),
                     recording.camera.width_px, recording.camera.height_px,
                     (*pictures)[pairs[index].second], matches) +
         "</div>";

@@ -101,7 +101,7 @@ double TypicalResidual(const std::vector<double>& residuals_px, size_t min_count
   if (residuals_px.size() < std::max<size_t>(1, min_count)) return kNaN;
   std::vector<double> magnitudes;
   for (const double r : residuals_px) magnitudes.push_back(std::abs(r));
-  return 1.4826 * MedianInPlace(&magnitudes);
+  return kSigmaOfMedian * MedianInPlace(&magnitudes);
 }
 
 ReportSection ResidualSection(const std::string& id, const std::string& title,

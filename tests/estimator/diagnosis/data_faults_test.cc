@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "core/saturation.h"
 #include "core/so3.h"
 #include "frontend/camera_rotations.h"
 #include "tools/simulation/simulate.h"

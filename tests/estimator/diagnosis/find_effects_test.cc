@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "core/so3.h"
+#include "core/standard_distortion.h"
 #include "estimator/diagnosis/diagnose.h"
 #include "tools/simulation/simulate.h"
 
