@@ -59,7 +59,7 @@ struct OnePair {
     rates.resize(3, static_cast<Eigen::Index>(inside.size()));
     for (size_t i = 0; i < inside.size(); ++i) rates.col(static_cast<Eigen::Index>(i)) = inside[i];
     pair->rate_group_sizes = {static_cast<int>(inside.size())};
-    shutter << truth.delay_s, truth.readout_s;
+    shutter << truth.readout_s, truth.delay_s;
     lens = truth.lens;
     q_gyro_cam = truth.q_gyro_cam;
   }

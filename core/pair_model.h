@@ -7,15 +7,17 @@
 #include <Eigen/Core>
 #include <utility>
 
+#include "core/calibration.h"
 #include "core/effects/catalogue.h"
 #include "core/lens.h"
 #include "core/rotation_chain.h"
 
 namespace camgyro {
 
-// The shutter clock's parameter block: [ t_d [s], t_r [s] ].
-enum ShutterIndex : int { kDelay, kReadout, kShutterSize };
+// The shutter clock's parameter block: [ t_r [s], t_d [s] ], in the order of the state.
+enum ShutterIndex : int { kReadout, kDelay, kShutterSize };
 using ShutterParameters = Eigen::Matrix<double, kShutterSize, 1>;
+inline ShutterParameters ShutterOf(const Calibration& c) { return {c.readout_s, c.delay_s}; }
 
 // Time on the gyro clock at which row v_px is exposed, eq. (2):
 //   t_gyro = t_frame + t_d + t_r * v / h

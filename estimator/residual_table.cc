@@ -17,7 +17,7 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
                                             const Calibration& calibration, double noise_px,
                                             const PairGraphOptions& options) {
   std::vector<MatchResidual> residuals;
-  const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);
+  const ShutterParameters shutter = ShutterOf(calibration);
   PairView view;
   for (const TimedPair& pair : pairs) {
     if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;

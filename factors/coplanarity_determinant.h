@@ -17,7 +17,7 @@ namespace camgyro {
 //   r = Robustify( det(n_1, n_2, n_3) / sigma ),  n_i = (R_i f_i) x (R'_i f'_i)      eq. (4), (9)
 //
 // Parameters  lens         kLensSize     LensParameters
-//             shutter      kShutterSize  t_d [s], t_r [s]
+//             shutter      kShutterSize  t_r [s], t_d [s]
 //             q_gyro_cam   4   RotationManifold
 //             effects      of PairMeasurement::effects, if there are any
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]

@@ -44,7 +44,7 @@ using BendVector = Eigen::Matrix<double, 6, 1>;
 // bow, the steps of somebody who runs leave b_y, c_y, t_r, t_d 0.8 to 0.4 sigmas off at 0.5 px.)
 //
 // Parameters  lens         kLensSize     LensParameters
-//             shutter      kShutterSize  t_d [s], t_r [s]
+//             shutter      kShutterSize  t_r [s], t_d [s]
 //             q_gyro_cam   4   RotationManifold
 //             tau          3   SphereManifold<3>: translation direction in the pair's reference,
 //                              the gyro frame at the first rate (sign without meaning)

@@ -15,7 +15,7 @@ namespace camgyro {
 //   r = Robustify_norm( Log( R_gyro_b^T R_gyro_a * R_gyro_cam R_cama_camb R_gyro_cam^T ) / sigma )
 //   R_gyro_a, R_gyro_b: the rotation chain at t_a + t_d + row t_r, t_b + t_d + row t_r
 //
-// Parameters  shutter      2   t_d [s], t_r [s]
+// Parameters  shutter      2   t_r [s], t_d [s]
 //             q_gyro_cam   4   RotationManifold
 //             effects      of Measurement::effects, if there are any
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]

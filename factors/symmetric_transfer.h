@@ -19,7 +19,7 @@ namespace camgyro {
 //   R_a, R_b: the camera's orientation at the exposure of px_a, px_b
 //
 // Parameters  lens         kLensSize     LensParameters
-//             shutter      kShutterSize  t_d [s], t_r [s]
+//             shutter      kShutterSize  t_r [s], t_d [s]
 //             q_gyro_cam   4   RotationManifold
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    four per match. The two directions repeat one error: the sum of the four squares is

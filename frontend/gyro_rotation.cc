@@ -15,10 +15,6 @@ namespace {
 constexpr double kMaxGyroGapS = 0.05;  // as in the estimators
 constexpr int kRowIterations = 3;      // the row of arrival decides over its own time
 
-ShutterParameters ShutterOf(const Calibration& calibration) {
-  return {calibration.delay_s, calibration.readout_s};
-}
-
 }  // namespace
 
 GyroRotation::GyroRotation(const Calibration& calibration, RotationChain chain, double interval_s)

@@ -137,7 +137,7 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
   auto measurement = std::make_shared<PairMeasurement>(view.measurement);
   measurement->effects = all.set->size() > 0 ? all.set : nullptr;
   const CoplanarityPlane cost(measurement);
-  const ShutterParameters shutter(c.delay_s, c.readout_s);
+  const ShutterParameters shutter = ShutterOf(c);
   std::vector<const double*> parameters = {c.lens.data(), shutter.data(),
                                            c.q_gyro_cam.coeffs().data(), plane.tau.data(),
                                            plane.bend.data()};
@@ -208,7 +208,7 @@ bool RotationSystem(const EstimationInput& input, const TimedPair& pair, const C
   m->robust_threshold = options.robust_threshold;
   m->effects = all.set->size() > 0 ? all.set : nullptr;
   const RelativeRotation cost(m);
-  const ShutterParameters shutter(c.delay_s, c.readout_s);
+  const ShutterParameters shutter = ShutterOf(c);
   std::vector<const double*> parameters = {shutter.data(), c.q_gyro_cam.coeffs().data()};
   if (m->effects) parameters.push_back(all.values.data());
   parameters.push_back(rates.data());

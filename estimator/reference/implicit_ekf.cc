@@ -118,7 +118,7 @@ bool ImplicitEkf::Measure(const Pair& pair, const VectorXd& x, Measurement* out)
   const Matrix3d R_gyro_cam = q.toRotationMatrix();
   const Lens& model = GetLens(start_.distortion_model);
   const LensParameters lens = LensOf(x);
-  const ShutterParameters shutter(x[kTd], x[kTr]);
+  const ShutterParameters shutter(x[kTr], x[kTd]);
 
   // R_i f_i with f_i normalised, and what v_i makes of it. v moves the ray only: that a detection
   // error in v also reads another row's time is not in (9).

@@ -115,7 +115,7 @@ Result<VinsWindow> MakeVinsWindow(const VinsInput& input, double interval_s) {
                     {},
                     {},
                     {}};
-  const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);
+  const ShutterParameters shutter = ShutterOf(calibration);
   const double height = calibration.height_px;
   for (const int frame : ChooseKeyframes(input.frame_stamps_ns, interval_s)) {
     const double stamp_s = SecondsSince(origin_ns, input.frame_stamps_ns[frame]);

@@ -48,8 +48,7 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
   Block lens{Geometry::kEuclidean, start.lens, {}};
   for (int k = kAspect; k < kLensSize; ++k) lens.constant.push_back(k);
   graph_.AddBlock(kLensBlock, std::move(lens));
-  graph_.AddBlock(kShutterBlock,
-                  {Geometry::kEuclidean, ShutterParameters(start.delay_s, start.readout_s), {}});
+  graph_.AddBlock(kShutterBlock, {Geometry::kEuclidean, ShutterOf(start), {}});
   graph_.AddBlock(kRotationBlock, {Geometry::kRotation, start.q_gyro_cam.coeffs(), {}});
 
   const int size = kLensSize + kShutterSize + 3;
@@ -61,10 +60,9 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
   inv_sigma[kLensSize + kReadout] = 1.0 / sigma[kStateReadout];
   inv_sigma.tail<3>() = sigma.segment<3>(kStateRotation).cwiseInverse();
   graph_.AddFactor(std::make_shared<MarginalPrior>(
-                       std::vector<MarginalPrior::Block>{
-                           {prior.mean.lens, false},
-                           {ShutterParameters(prior.mean.delay_s, prior.mean.readout_s), false},
-                           {prior.mean.q_gyro_cam.coeffs(), true}},
+                       std::vector<MarginalPrior::Block>{{prior.mean.lens, false},
+                                                         {ShutterOf(prior.mean), false},
+                                                         {prior.mean.q_gyro_cam.coeffs(), true}},
                        inv_sigma.asDiagonal(), Eigen::VectorXd::Zero(size)),
                    {kLensBlock, kShutterBlock, kRotationBlock});
   prior_mean_.effects = start.effects;

@@ -67,7 +67,7 @@ PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i)
 }
 
 std::vector<double> TransferResiduals(const PairView& view, const Calibration& calibration) {
-  const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);
+  const ShutterParameters shutter = ShutterOf(calibration);
   const double* const parameters[] = {calibration.lens.data(), shutter.data(),
                                       calibration.q_gyro_cam.coeffs().data(), view.rates.data()};
   std::vector<double> residuals =
@@ -171,7 +171,7 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
                 calibration.readout_s, gap_s);
   m.effects = calibration.pair_effects().set != nullptr ? calibration.effects : nullptr;
   const RotationChain chain(m.rate_times_s, view->rates);
-  const ShutterParameters shutter(calibration.delay_s, calibration.readout_s);
+  const ShutterParameters shutter = ShutterOf(calibration);
   const Eigen::Matrix3d R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
   view->bearings = {};
   Bearing a, b;

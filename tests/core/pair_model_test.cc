@@ -41,7 +41,7 @@ Case RandomCase(uint64_t seed) {
   Case c;
   c.lens = MakePinhole(460.0, {370.0, 245.0}, 1.01);
   c.lens.segment<4>(kK1) << -0.25, 0.06, 0.002, -0.001;
-  c.shutter << 0.004, 0.025;
+  c.shutter << 0.025, 0.004;
   c.q_gyro_cam = Exp(Vector3d(normal(generator), normal(generator), normal(generator)));
   c.rates.resize(3, 10);
   for (int i = 0; i < 10; ++i) {
@@ -54,7 +54,7 @@ Case RandomCase(uint64_t seed) {
 
 // Exposure time of a row, by hand: 0.5 s + 30 ms delay + 24 ms * 120/480 = 0.536 s.
 TEST(PairModel, RowTimeFollowsEquationTwo) {
-  EXPECT_NEAR(RowTimeGyroS(0.5, ShutterParameters(0.030, 0.024), 120.0, 480.0), 0.536, 1e-15);
+  EXPECT_NEAR(RowTimeGyroS(0.5, ShutterParameters(0.024, 0.030), 120.0, 480.0), 0.536, 1e-15);
 }
 
 TEST(PairModel, DerivativeByThePixelIncludesTheRowsTime) {

@@ -142,7 +142,7 @@ TEST(CoplanarityPlane, DirectionFollowsAPathWithJerk) {
       const double u = t - middle_s;
       return Eigen::Vector3d(u * u / 2.0 * acceleration + u * u * u / 6.0 * jerk);
     });
-    ASSERT_EQ(s.shutter, ShutterParameters(0.006, readout_s));
+    ASSERT_EQ(s.shutter, ShutterParameters(readout_s, 0.006));
     s.pair->readout_over_gap = readout_s / gap_s;
     const Eigen::Vector3d path = s.tau + gap_s * gap_s / 24.0 * jerk;  // velocity 1 m/s along tau
     s.tau = path.normalized();

@@ -51,7 +51,7 @@ inline PairScene MakePairScene(
   PairScene s;
   s.lens = MakePinhole(460.0, {370.0, 245.0}, 1.003);
   s.lens.segment<4>(kK1) << -0.28, 0.07, 0.001, -0.002;
-  s.shutter << 0.006, 0.025;
+  s.shutter << 0.025, 0.006;
   s.q_gyro_cam = Exp(random_vector());
   s.tau = random_vector().normalized();
   s.pair->frame_a.stamp_s = 1.0;

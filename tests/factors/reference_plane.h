@@ -71,8 +71,8 @@ void RayAndJacobian(const PairMeasurement& pair, const T* lens, const T* shutter
   const Vec3<T> by_u(D(1, 1) / det / fx, -D(1, 0) / det / fx, T(0));
   const Vec3<T> by_v(-D(0, 1) / det / fy, D(0, 0) / det / fy, T(0));
 
-  const T line_delay = shutter[1] / T(pair.size_px.y());
-  const T time = T(stamp) + shutter[0] + line_delay * T(px.y());
+  const T line_delay = shutter[kReadout] / T(pair.size_px.y());
+  const T time = T(stamp) + shutter[kDelay] + line_delay * T(px.y());
   const Eigen::Matrix<T, 3, 3> R_gyro_cam =
       Eigen::Quaternion<T>(q[3], q[0], q[1], q[2]).toRotationMatrix();
   Eigen::Matrix<T, 3, 3> R = Eigen::Matrix<T, 3, 3>::Identity();

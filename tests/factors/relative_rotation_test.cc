@@ -42,7 +42,7 @@ Scene MakeScene(uint64_t seed) {
     return Vector3d(normal(generator), normal(generator), normal(generator));
   };
   Scene s;
-  s.shutter << 0.012, 0.02;
+  s.shutter << 0.02, 0.012;
   s.q_gyro_cam = Exp(random_vector());
   auto& m = s.measurement;
   m.frame_a.stamp_s = 0.02;

@@ -168,7 +168,7 @@ std::vector<StateCovariance> InformationBound(const std::vector<FramePair>& exac
   }
   const double variance_b = noise_px * noise_px;
   const double variance_a = recording.match_noise == MatchNoise::kBothImages ? variance_b : 0.0;
-  const ShutterParameters shutter(truth.delay_s, truth.readout_s);
+  const ShutterParameters shutter = ShutterOf(truth);
   const Matrix3d R_gyro_cam = truth.q_gyro_cam.toRotationMatrix();
   const Lens& lens = GetLens(truth.distortion_model);
   Accumulator accumulator(truth, prior_sigma, gyro_sigma_rad_s);

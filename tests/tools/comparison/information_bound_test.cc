@@ -132,8 +132,8 @@ class Everything {
     lens[kFocal] += x[kStateFocal];
     lens[kCx] += x[kStateCx];
     lens[kCy] += x[kStateCy];
-    const ShutterParameters shutter(truth.delay_s + x[kStateDelay],
-                                    truth.readout_s + x[kStateReadout]);
+    const ShutterParameters shutter(truth.readout_s + x[kStateReadout],
+                                    truth.delay_s + x[kStateDelay]);
     const Eigen::Matrix3d R_gyro_cam =
         (truth.q_gyro_cam * Exp(Vector3d(x.segment<3>(kStateRotation)))).toRotationMatrix();
     const RotationChain chain = Chain(x);
