@@ -14,7 +14,7 @@ install(TARGETS ${libraries} EXPORT camgyroTargets ARCHIVE DESTINATION ${CMAKE_I
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro)
 
 # Included as in this repository: "core/calibration.h". Of the readers only the entrance is public.
-install(DIRECTORY core factors frontend estimator
+install(DIRECTORY core factors frontend estimator pipeline
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro
         FILES_MATCHING PATTERN "*.h" PATTERN "readers" EXCLUDE)
 install(FILES frontend/readers/read_recording.h

@@ -6,11 +6,11 @@
 
 #include "estimator/calibrate.h"
 #include "estimator/reference/calibrate_with_ekf.h"
+#include "pipeline/result_files.h"
 #include "tools/commands.h"
 #include "tools/fit_flags.h"
 #include "tools/recording_input.h"
 #include "tools/report/calibrate_report.h"
-#include "tools/result_files.h"
 #include "tools/summary.h"
 
 DEFINE_string(out, "",

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <thread>
 
+#include "pipeline/result_files.h"
 #include "tools/commands.h"
 #include "tools/comparison/comparison_report.h"
 #include "tools/comparison/error_plot.h"
@@ -14,7 +15,6 @@
 #include "tools/fit_flags.h"
 #include "tools/progress_bar.h"
 #include "tools/report/page.h"
-#include "tools/result_files.h"
 
 DEFINE_string(estimators, "window,refinement,ekf", "which to run, in this order");
 DEFINE_string(truth, "",

@@ -14,9 +14,9 @@
 #include "estimator/start/slerp_delay_search.h"
 #include "frontend/camera_rotations.h"
 #include "frontend/two_view_rotation.h"
+#include "pipeline/result_files.h"
 #include "tools/commands.h"
 #include "tools/recording_input.h"
-#include "tools/result_files.h"
 #include "tools/summary.h"
 
 DECLARE_string(out);

@@ -4,11 +4,11 @@
 #include <cstdio>
 
 #include "estimator/diagnosis/diagnose.h"
+#include "pipeline/result_files.h"
 #include "tools/commands.h"
 #include "tools/diagnosis_file.h"
 #include "tools/diagnosis_report.h"
 #include "tools/recording_input.h"
-#include "tools/result_files.h"
 #include "tools/summary.h"
 
 DECLARE_string(out);

@@ -6,10 +6,10 @@
 #include <filesystem>
 
 #include "frontend/readers/read_recording.h"
+#include "pipeline/read_calibration.h"
+#include "pipeline/result_files.h"
 #include "tools/commands.h"
 #include "tools/export/export.h"
-#include "tools/read_calibration.h"
-#include "tools/result_files.h"
 #include "tools/summary.h"
 
 DECLARE_string(out);

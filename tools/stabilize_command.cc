@@ -8,8 +8,8 @@
 
 #include "core/format.h"
 #include "frontend/readers/read_recording.h"
+#include "pipeline/read_calibration.h"
 #include "tools/commands.h"
-#include "tools/read_calibration.h"
 #include "tools/recording_input.h"
 #include "tools/stabilization/stabilize.h"
 #include "tools/summary.h"

@@ -7,10 +7,10 @@
 #include <sstream>
 
 #include "frontend/track_recording.h"
+#include "pipeline/read_calibration.h"
+#include "pipeline/result_files.h"
 #include "tools/commands.h"
-#include "tools/read_calibration.h"
 #include "tools/recording_input.h"
-#include "tools/result_files.h"
 #include "tools/summary.h"
 
 DECLARE_string(out);

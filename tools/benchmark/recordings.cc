@@ -1,8 +1,8 @@
 #include "core/time.h"
 #include "frontend/readers/read_recording.h"
 #include "frontend/two_view_rotation.h"
+#include "pipeline/read_calibration.h"
 #include "tools/benchmark/benchmark.h"
-#include "tools/read_calibration.h"
 
 namespace camgyro {
 namespace {

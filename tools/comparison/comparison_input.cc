@@ -9,8 +9,8 @@
 #include "estimator/calibrate.h"
 #include "estimator/reference/implicit_ekf.h"
 #include "frontend/readers/read_recording.h"
+#include "pipeline/read_calibration.h"
 #include "tools/command_line.h"
-#include "tools/read_calibration.h"
 #include "tools/recording_input.h"
 #include "tools/simulation/simulate.h"
 

@@ -3,8 +3,8 @@
 
 #include "estimator/vins/initialise.h"
 #include "frontend/readers/read_recording.h"
+#include "pipeline/read_calibration.h"
 #include "tests/measured_data.h"
-#include "tools/read_calibration.h"
 
 namespace camgyro {
 namespace {

@@ -14,8 +14,8 @@
 #include "core/so3.h"
 #include "core/time.h"
 #include "frontend/readers/read_recording.h"
+#include "pipeline/read_calibration.h"
 #include "tests/tools/run_camgyro.h"
-#include "tools/read_calibration.h"
 
 namespace camgyro {
 namespace {

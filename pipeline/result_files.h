@@ -1,6 +1,6 @@
 // The files of a result: calibration.yaml, trace.csv, delay.csv (design.md section 7).
-#ifndef CAMGYRO_TOOLS_RESULT_FILES_H_
-#define CAMGYRO_TOOLS_RESULT_FILES_H_
+#ifndef CAMGYRO_PIPELINE_RESULT_FILES_H_
+#define CAMGYRO_PIPELINE_RESULT_FILES_H_
 
 #include <string>
 #include <utility>
@@ -46,4 +46,4 @@ std::string DelayCsv(const std::vector<DelayResidual>& curve);
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TOOLS_RESULT_FILES_H_
+#endif  // CAMGYRO_PIPELINE_RESULT_FILES_H_

@@ -1,4 +1,4 @@
-#include "tools/read_calibration.h"
+#include "pipeline/read_calibration.h"
 
 #include <yaml-cpp/yaml.h>
 

@@ -1,5 +1,5 @@
 // calibration.yaml and truth.yaml read back; what is wrong is refused with file, line and key.
-#include "tools/read_calibration.h"
+#include "pipeline/read_calibration.h"
 
 #include <gmock/gmock.h>
 
@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "estimator/calibrate.h"
+#include "pipeline/result_files.h"
 #include "tests/measured_data.h"
 #include "tests/tools/run_camgyro.h"
-#include "tools/result_files.h"
 
 namespace camgyro {
 namespace {

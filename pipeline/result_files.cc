@@ -1,4 +1,4 @@
-#include "tools/result_files.h"
+#include "pipeline/result_files.h"
 
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>

@@ -1,6 +1,6 @@
 // Reads a calibration.yaml back (design.md section 7).
-#ifndef CAMGYRO_TOOLS_READ_CALIBRATION_H_
-#define CAMGYRO_TOOLS_READ_CALIBRATION_H_
+#ifndef CAMGYRO_PIPELINE_READ_CALIBRATION_H_
+#define CAMGYRO_PIPELINE_READ_CALIBRATION_H_
 
 #include <string>
 #include <vector>
@@ -25,4 +25,4 @@ Result<std::vector<std::string>> ReadEffectNames(const std::string& path);
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TOOLS_READ_CALIBRATION_H_
+#endif  // CAMGYRO_PIPELINE_READ_CALIBRATION_H_
