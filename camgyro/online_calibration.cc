@@ -5,10 +5,9 @@
 #include <utility>
 
 #include "core/time.h"
-#include "estimator/calibrate.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/window/estimation_input.h"
-#include "frontend/camera_rotations.h"
+#include "pipeline/run.h"
 
 namespace camgyro {
 namespace {
@@ -98,13 +97,10 @@ Status OnlineCalibration::TryStart() {
     recording.frames.emplace_back().stamp_ns = frame.stamp_ns;
     recording.tracks.push_back(frame.points);
   }
-  const std::vector<FramePair> pairs = SpreadPairs(PairsForRotations(recording), kMaxScanPairs);
   StartOptions options;
   options.search_s = kSearchS;
-  const Result<StartResult> start = FindStartAndFocal(
-      recording,
-      [&](double focal_px) { return CameraRotationsOf(pairs, recording.camera, focal_px); },
-      options, {});
+  const Result<StartResult> start =
+      FindStartAndFocal(recording, RotationsFrom(recording, kMaxScanPairs), options, {});
   if (!start) return tl::unexpected(start.error());
 
   gap_ = SelectPairs(recording, /*longest_gap=*/10, /*least_pairs=*/10).gap;
@@ -115,8 +111,7 @@ Status OnlineCalibration::TryStart() {
   from.bias_gyro_rad_s = start->bias_gyro_rad_s;
   if (start->focal && start->focal->determined) from.lens[kFocal] = start->focal->value_px;
   SlidingWindowOptions window_options;
-  window_options.graph.match_noise = noise_;
-  window_options.graph.gyro_sigma_rad_s = GyroSigma(recording, start->delay_middle_row_s);
+  window_options.graph = GraphOptionsFor(recording, *start, {});
   window_.emplace(from, prior, gyro_.front().stamp_ns, window_options);
   window_->SetListener([this](const WindowUpdate& update) { Remember(update); });
   history_.clear();

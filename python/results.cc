@@ -7,18 +7,16 @@
 #include <vector>
 
 #include "core/standard_distortion.h"
-#include "estimator/calibrate.h"
 #include "estimator/vins/initialise.h"
-#include "frontend/camera_rotations.h"
-#include "frontend/track_recording.h"
+#include "pipeline/read_calibration.h"
+#include "pipeline/result_files.h"
+#include "pipeline/run.h"
 #include "python/bindings.h"
 
 namespace camgyro {
 namespace {
 
 namespace py = pybind11;
-
-constexpr size_t kMaxScanPairs = 400;  // per trial focal length
 
 Eigen::Vector4d Wxyz(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
@@ -27,27 +25,20 @@ Eigen::Quaterniond FromWxyz(const Eigen::Vector4d& wxyz) {
 }
 
 CalibrationReport Calibrate(Recording* recording, bool refine) {
-  Result<CalibrationReport> report = [&]() -> Result<CalibrationReport> {
+  Result<CalibrationRun> run = [&] {
     const py::gil_scoped_release release;
-    if (recording->tracks.empty() && recording->matches.empty() && recording->HasImages()) {
-      if (const auto tracked = TrackRecording({}, nullptr, nullptr, recording); !tracked) {
-        return tl::unexpected(tracked.error());
-      }
-    } else if (!recording->tracks.empty() || !recording->matches.empty()) {
-      if (Status enough = CheckImageMotion(*recording); !enough) {
-        return tl::unexpected(enough.error());
-      }
-    }
-    const std::vector<FramePair> pairs = SpreadPairs(PairsForRotations(*recording), kMaxScanPairs);
     CalibrateOptions options;
     options.refine = refine;
-    return CalibrateRecording(
-        *recording,
-        [&](double focal_px) { return CameraRotationsOf(pairs, recording->camera, focal_px); },
-        options);
+    return RunCalibration(options, OnlineEstimator::kWindow, nullptr, recording);
   }();
-  if (!report) Raise(report.error());
-  return *std::move(report);
+  if (!run) Raise(run.error());
+  return std::move(run->report);
+}
+
+Calibration ReadFile(const std::string& path) {
+  Result<Calibration> calibration = ReadCalibration(path);
+  if (!calibration) Raise(calibration.error());
+  return *std::move(calibration);
 }
 
 // Columns of the online trace by name.
@@ -167,6 +158,12 @@ void BindResults(py::module_* module) {
       .def_readonly("doubts", &CalibrationReport::doubts,
                     "list of str: reasons not to believe a number")
       .def_readonly("converged", &CalibrationReport::converged)
+      .def(
+          "yaml",
+          [](const CalibrationReport& r, const Recording& recording) {
+            return CalibrationYaml(r, recording.HasOnlyAttitudes());
+          },
+          py::arg("recording"), "str: the text of calibration.yaml, of the recording calibrated")
       .def_property_readonly("rms_px", [](const CalibrationReport& r) { return r.quality.rms_px; })
       .def_property_readonly("noise_px",
                              [](const CalibrationReport& r) { return r.quality.noise_px; })
@@ -185,6 +182,9 @@ void BindResults(py::module_* module) {
             return curve;
           },
           "float array (n, 2): delay [s], share of the gyro's power that stays unexplained");
+  module->def("read_calibration", &ReadFile, py::arg("path"),
+              "The values and sigmas of a calibration.yaml, or of a simulator's truth.yaml. Raises "
+              "camgyro.Error, code 3, naming file, line and key.");
   module->def("calibrate", &Calibrate, py::arg("recording"), py::arg("refine") = true,
               "Calibrates a recording; pictures are tracked first, and their tracks stay in it. "
               "refine=False: only the online pass. Raises camgyro.Error, code 4, with the reason "

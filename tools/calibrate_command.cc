@@ -4,11 +4,11 @@
 #include <cstdio>
 #include <utility>
 
-#include "estimator/calibrate.h"
-#include "estimator/reference/calibrate_with_ekf.h"
 #include "pipeline/result_files.h"
+#include "pipeline/run.h"
 #include "tools/commands.h"
 #include "tools/fit_flags.h"
+#include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/report/calibrate_report.h"
 #include "tools/summary.h"
@@ -62,25 +62,16 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
     std::fflush(stdout);
   }
 
-  Result<CalibrationReport> report = CannotEstimate("");
-  Result<TrackingSummary> tracking;
+  Result<CalibrationRun> run = CannotEstimate("");
   {
     ProgressBar bar;
-    tracking = EnsureImageMotion(&bar, &*recording);
-    if (!tracking) return tl::unexpected(tracking.error());
-    if (FLAGS_estimator == "ekf") {
-      report = CalibrateWithEkf(*recording, RotationsFrom(*recording), *options, {});
-    } else {
-      report =
-          CalibrateRecording(*recording, RotationsFrom(*recording), *options,
-                             [&](const std::string& stage, double done) { bar.Show(stage, done); });
-    }
+    run = RunCalibration(
+        *options, FLAGS_estimator == "ekf" ? OnlineEstimator::kPaperEkf : OnlineEstimator::kWindow,
+        [&](const std::string& stage, double done) { bar.Show(stage, done); }, &*recording);
   }
-  if (!report) return Refusal(*recording, report.error());
-  if (recording->declared_stabilisation) {
-    report->doubts.push_back("the picture was stabilised electronically, says the file (" +
-                             *recording->declared_stabilisation + ")");
-  }
+  if (!run) return tl::unexpected(run.error());
+  const CalibrationReport* report = &run->report;
+  const TrackingSummary* tracking = &run->tracking;
 
   const bool attitudes = recording->HasOnlyAttitudes();
   files.Add("trace.csv", TraceCsv(report->trace));

@@ -15,7 +15,9 @@
 #include "frontend/camera_rotations.h"
 #include "frontend/two_view_rotation.h"
 #include "pipeline/result_files.h"
+#include "pipeline/run.h"
 #include "tools/commands.h"
+#include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/summary.h"
 
@@ -132,11 +134,12 @@ Status RunDelay(const std::vector<std::string>& arguments) {
   Result<DelayReport> report = CannotEstimate("");
   {
     ProgressBar bar;
-    const Result<TrackingSummary> tracking = EnsureImageMotion(&bar, &*recording);
+    const Result<TrackingSummary> tracking = EnsureImageMotion(
+        [&](const std::string& stage, double done) { bar.Show(stage, done); }, &*recording);
     if (!tracking) return tl::unexpected(tracking.error());
     report = FindDelay(*recording, &bar);
   }
-  if (!report) return Refusal(*recording, report.error());
+  if (!report) return tl::unexpected(Refusal(*recording, report.error()));
   const StartResult& start = report->start;
   if (!FLAGS_out.empty()) {
     files.Add("delay.csv", DelayCsv(start.curve));

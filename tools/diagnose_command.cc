@@ -3,11 +3,12 @@
 
 #include <cstdio>
 
-#include "estimator/diagnosis/diagnose.h"
 #include "pipeline/result_files.h"
+#include "pipeline/run.h"
 #include "tools/commands.h"
 #include "tools/diagnosis_file.h"
 #include "tools/diagnosis_report.h"
+#include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/summary.h"
 
@@ -38,14 +39,15 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
                 Notes("input", recording->notes).c_str());
     std::fflush(stdout);
   }
-  Diagnosis diagnosis;
+  Result<DiagnosisRun> run = CannotEstimate("");
   {
     ProgressBar bar;
-    const Result<TrackingSummary> tracking = EnsureImageMotion(&bar, &*recording);
-    if (!tracking) return tl::unexpected(tracking.error());
-    diagnosis = Diagnose(*recording, RotationsFrom(*recording), options,
-                         [&](const std::string& stage, double done) { bar.Show(stage, done); });
+    run = RunDiagnosis(
+        options, [&](const std::string& stage, double done) { bar.Show(stage, done); },
+        &*recording);
   }
+  if (!run) return tl::unexpected(run.error());
+  const Diagnosis& diagnosis = run->diagnosis;
   const bool attitudes = recording->HasOnlyAttitudes();
   files.Add("diagnosis.yaml", DiagnosisYaml(diagnosis));
   if (diagnosis.before) {
@@ -79,7 +81,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
                     ? ", calibration.yaml, report.html, residual_maps.csv, trace.csv, delay.csv"
                     : "");
   }
-  if (diagnosis.refusal) return Refusal(*recording, *diagnosis.refusal);
+  if (diagnosis.refusal) return tl::unexpected(Refusal(*recording, *diagnosis.refusal));
   if (!diagnosis.not_tested.empty()) return CannotEstimate("diagnosis: " + diagnosis.not_tested);
   return {};
 }

@@ -2,11 +2,8 @@
 
 #include <gflags/gflags.h>
 
-#include <utility>
-
 #include "core/format.h"
 #include "core/time.h"
-#include "frontend/camera_rotations.h"
 #include "frontend/readers/read_recording.h"
 #include "tools/command_line.h"
 
@@ -20,12 +17,6 @@ DEFINE_double(delay_ms, 0.0,
               "else 0");
 
 namespace camgyro {
-namespace {
-
-constexpr size_t kMaxScanPairs = 400;  // per trial focal length
-
-}  // namespace
-
 std::vector<std::string> GuessFlags() { return {"focal_px", "readout_ms", "delay_ms"}; }
 
 Result<Recording> OpenRecording(const std::string& path) {
@@ -39,31 +30,6 @@ Result<Recording> OpenRecording(const std::string& path) {
   if (FlagGiven("readout_ms")) guess.readout_s = 1e-3 * FLAGS_readout_ms;
   if (FlagGiven("delay_ms")) guess.delay_s = 1e-3 * FLAGS_delay_ms;
   return recording;
-}
-
-Result<TrackingSummary> EnsureImageMotion(ProgressBar* progress, Recording* recording) {
-  if (recording->HasOnlyAttitudes()) return TrackingSummary{};
-  if (recording->tracks.empty() && recording->matches.empty()) {
-    return TrackRecording(
-        {}, nullptr, [&](double done) { progress->Show("tracking", done); }, recording);
-  }
-  if (Status enough = CheckImageMotion(*recording); !enough) return tl::unexpected(enough.error());
-  return TrackingSummary{};
-}
-
-CameraRotationsAtFocal RotationsFrom(const Recording& recording) {
-  return [pairs = SpreadPairs(PairsForRotations(recording), kMaxScanPairs),
-          camera = recording.camera](double focal_px) {
-    return CameraRotationsOf(pairs, camera, focal_px);
-  };
-}
-
-tl::unexpected<Error> Refusal(const Recording& recording, Error error) {
-  if (error.kind == ErrorKind::kCannotEstimate && recording.declared_stabilisation) {
-    error.message = "the picture was stabilised electronically, says the file (" +
-                    *recording.declared_stabilisation + "), and indeed: " + error.message;
-  }
-  return tl::unexpected(std::move(error));
 }
 
 std::string DescribeRecording(const Recording& recording) {

@@ -10,6 +10,7 @@
 #include "pipeline/read_calibration.h"
 #include "pipeline/result_files.h"
 #include "tools/commands.h"
+#include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/summary.h"
 

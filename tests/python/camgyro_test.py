@@ -65,6 +65,17 @@ class CamgyroTest(unittest.TestCase):
     w, x, y, z = c.q_gyro_cam
     self.assertAlmostEqual(c.R_gyro_cam[0, 0], 1 - 2 * (y * y + z * z), places=12)
 
+  def test_calibration_yaml_is_read_back(self):
+    path = pathlib.Path(self.folder.name) / 'calibration.yaml'
+    path.write_text(self.report.yaml(self.recording))
+    read, c = camgyro.read_calibration(str(path)), self.report.calibration
+    np.testing.assert_allclose(read.sigma, c.sigma, rtol=1e-8)
+    self.assertAlmostEqual(read.focal_px, c.focal_px, places=5)
+    self.assertEqual(read.determined, c.determined)
+    path.write_text('camera: {resolution: [640]}')
+    with self.assertRaisesRegex(camgyro.Error, r'calibration.yaml.*resolution'):
+      camgyro.read_calibration(str(path))
+
   def test_trace_and_curve(self):
     trace = self.report.trace
     n = len(trace['frame_stamp_ns'])

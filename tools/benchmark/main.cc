@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "estimator/calibrate.h"
+#include "pipeline/run.h"
 #include "tools/benchmark/benchmark.h"
-#include "tools/recording_input.h"
 
 DEFINE_string(what, "initialisation", "initialisation, or delay: Feng's search over a recording");
 DEFINE_string(simulate, "walking,running,handheld", "motions to simulate, comma-separated");

@@ -10,8 +10,8 @@
 #include "estimator/reference/implicit_ekf.h"
 #include "frontend/readers/read_recording.h"
 #include "pipeline/read_calibration.h"
+#include "pipeline/run.h"
 #include "tools/command_line.h"
-#include "tools/recording_input.h"
 #include "tools/simulation/simulate.h"
 
 namespace camgyro::comparison {

@@ -1,0 +1,60 @@
+#include "pipeline/run.h"
+
+#include <utility>
+#include <vector>
+
+#include "estimator/reference/calibrate_with_ekf.h"
+#include "frontend/camera_rotations.h"
+
+namespace camgyro {
+
+Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* recording) {
+  if (recording->HasOnlyAttitudes()) return TrackingSummary{};
+  if (recording->tracks.empty() && recording->matches.empty()) {
+    TrackingProgress tracking;
+    if (progress) tracking = [&](double done) { progress("tracking", done); };
+    return TrackRecording({}, nullptr, tracking, recording);
+  }
+  if (Status enough = CheckImageMotion(*recording); !enough) return tl::unexpected(enough.error());
+  return TrackingSummary{};
+}
+
+CameraRotationsAtFocal RotationsFrom(const Recording& recording, size_t max_pairs) {
+  return [pairs = SpreadPairs(PairsForRotations(recording), max_pairs), camera = recording.camera](
+             double focal_px) { return CameraRotationsOf(pairs, camera, focal_px); };
+}
+
+Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEstimator estimator,
+                                      const Progress& progress, Recording* recording) {
+  const Result<TrackingSummary> tracking = EnsureImageMotion(progress, recording);
+  if (!tracking) return tl::unexpected(tracking.error());
+  const CameraRotationsAtFocal rotations_at = RotationsFrom(*recording);
+  Result<CalibrationReport> report =
+      estimator == OnlineEstimator::kPaperEkf
+          ? CalibrateWithEkf(*recording, rotations_at, options, {})
+          : CalibrateRecording(*recording, rotations_at, options, progress);
+  if (!report) return tl::unexpected(Refusal(*recording, report.error()));
+  if (recording->declared_stabilisation) {
+    report->doubts.push_back("the picture was stabilised electronically, says the file (" +
+                             *recording->declared_stabilisation + ")");
+  }
+  return CalibrationRun{*tracking, *std::move(report)};
+}
+
+Result<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options, const Progress& progress,
+                                  Recording* recording) {
+  const Result<TrackingSummary> tracking = EnsureImageMotion(progress, recording);
+  if (!tracking) return tl::unexpected(tracking.error());
+  return DiagnosisRun{*tracking,
+                      Diagnose(*recording, RotationsFrom(*recording), options, progress)};
+}
+
+Error Refusal(const Recording& recording, Error error) {
+  if (error.kind == ErrorKind::kCannotEstimate && recording.declared_stabilisation) {
+    error.message = "the picture was stabilised electronically, says the file (" +
+                    *recording.declared_stabilisation + "), and indeed: " + error.message;
+  }
+  return error;
+}
+
+}  // namespace camgyro
