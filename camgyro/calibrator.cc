@@ -7,7 +7,6 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
-#include <map>
 #include <mutex>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -19,7 +18,7 @@
 #include "camgyro/online_calibration.h"
 #include "core/time.h"
 #include "estimator/vins/initialise.h"
-#include "frontend/outliers.h"
+#include "frontend/track_cleaner.h"
 #include "frontend/tracker.h"
 
 namespace camgyro::api {
@@ -28,6 +27,7 @@ namespace {
 constexpr std::int64_t kLargestStamp = 4'000'000'000'000'000'000;  // differences fit in int64
 constexpr double kMaxRate = 200.0, kMaxForce = 2000.0;
 constexpr std::size_t kMaxPoints = 5000;
+constexpr std::int64_t kFirstCutId = std::int64_t{1} << 40;  // the tracker counts from 0
 constexpr std::size_t kMaxSamplesWaiting = 200'000;
 constexpr double kLateS = 10.0;  // a frame this far behind the gyro is of no use any more
 // What InitialiseVins may look back on.
@@ -42,46 +42,6 @@ void Trim(std::deque<Sample>* samples, double keep_s, std::size_t keep) {
   }
 }
 
-// Gives a track a new id wherever its match is wrong, frame after frame.
-class TrackCleaner {
- public:
-  TrackCleaner(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
-
-  std::vector<TrackedPoint> Clean(const std::vector<TrackedPoint>& points) {
-    FramePair pair;
-    pair.matches = MatchesBetween(before_, points);
-    FramePair right = pair;
-    RejectByBinHomography(right, width_px_, height_px_);
-    before_ = points;
-    std::map<std::int64_t, std::int64_t> names;  // of what is seen now: bounded
-    std::vector<TrackedPoint> cleaned;
-    std::size_t match = 0, kept = 0;
-    for (const TrackedPoint& point : points) {
-      const auto known = names_.find(point.track_id);
-      std::int64_t name = known == names_.end() ? next_name_++ : known->second;
-      if (match < pair.matches.size() && pair.matches[match].px_b == point.px) {
-        const bool is_right = kept < right.matches.size() &&
-                              right.matches[kept].px_a == pair.matches[match].px_a &&
-                              right.matches[kept].px_b == pair.matches[match].px_b;
-        is_right ? static_cast<void>(++kept) : static_cast<void>(name = next_name_++);
-        ++match;
-      }
-      names.emplace(point.track_id, name);
-      cleaned.push_back({name, point.px, point.noise_factor});
-    }
-    names_ = std::move(names);
-    std::sort(cleaned.begin(), cleaned.end(),
-              [](const TrackedPoint& a, const TrackedPoint& b) { return a.track_id < b.track_id; });
-    return cleaned;
-  }
-
- private:
-  const int width_px_, height_px_;
-  std::vector<TrackedPoint> before_;
-  std::map<std::int64_t, std::int64_t> names_;  // the tracker's id -> ours
-  std::int64_t next_name_ = 0;
-};
-
 struct FrameIn {
   std::int64_t stamp_ns = 0;
   cv::Mat image;                     // a copy; empty with tracks
@@ -93,7 +53,9 @@ struct FrameIn {
 class Calibrator::Worker {
  public:
   Worker(const CalibratorOptions& options, const camgyro::CameraGuess& camera)
-      : options_(options), camera_(camera), cleaner_(camera.width_px, camera.height_px) {
+      : options_(options),
+        camera_(camera),
+        cleaner_(camera.width_px, camera.height_px, kFirstCutId) {
     auto first = std::make_shared<Snapshot>();
     first->message = "collecting the first frames";
     std::atomic_store(&snapshot_, std::shared_ptr<const Snapshot>(first));
@@ -314,7 +276,7 @@ class Calibrator::Worker {
     }
     if (frame == nullptr) return;
     std::vector<TrackedPoint> points = std::move(frame->points);
-    if (!frame->image.empty()) points = cleaner_.Clean(tracker_.Add(frame->image));
+    if (!frame->image.empty()) points = cleaner_.Add(tracker_.Add(frame->image));
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       recent_frames_.push_back({frame->stamp_ns, points});

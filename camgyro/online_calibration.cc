@@ -7,6 +7,7 @@
 #include "core/time.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/window/estimation_input.h"
+#include "frontend/track_cleaner.h"
 #include "pipeline/run.h"
 
 namespace camgyro {
@@ -24,20 +25,6 @@ constexpr double kSteadyS = 2.0;
 constexpr double kStaleS = 5.0;  // frames without a solved window
 
 }  // namespace
-
-std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
-                                  const std::vector<TrackedPoint>& b) {
-  std::vector<Match> matches;
-  for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
-    if (i->track_id == j->track_id) {
-      matches.push_back({i->px, j->px, j->noise_factor});
-      ++i, ++j;
-    } else {
-      i->track_id < j->track_id ? ++i : ++j;
-    }
-  }
-  return matches;
-}
 
 OnlineCalibration::OnlineCalibration(const CameraGuess& camera, MatchNoise noise, double start_s,
                                      std::function<void(const Progress&)> listener)

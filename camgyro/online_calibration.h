@@ -73,10 +73,6 @@ class OnlineCalibration {
   std::deque<std::pair<int64_t, Calibration>> history_;
 };
 
-// Matches of the tracks seen in both frames; both by ascending id.
-std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
-                                  const std::vector<TrackedPoint>& b);
-
 }  // namespace camgyro
 
 #endif  // CAMGYRO_ONLINE_CALIBRATION_H_
