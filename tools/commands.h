@@ -9,17 +9,23 @@
 
 namespace camgyro {
 
-Command CalibrateCommand();
-Command DiagnoseCommand();
-Command CompareCommand();
-Command DelayCommand();
-Command TrackCommand();
-Command SimulateCommand();
-Command ExportCommand();
-Command StabilizeCommand();
-Command HelpCommand();
+// One row per command, in the order of the help: a row X is the command of XCommand() in
+// x_command.cc.
+#define CAMGYRO_COMMANDS(ROW) \
+  ROW(Calibrate)              \
+  ROW(Diagnose)               \
+  ROW(Delay)                  \
+  ROW(Track)                  \
+  ROW(Simulate)               \
+  ROW(Compare)                \
+  ROW(Export)                 \
+  ROW(Stabilize)              \
+  ROW(Help)
 
-// All of them, in the order of the help.
+#define CAMGYRO_DECLARE(name) Command name##Command();
+CAMGYRO_COMMANDS(CAMGYRO_DECLARE)
+#undef CAMGYRO_DECLARE
+
 std::vector<Command> AllCommands();
 
 // The command of this name. Errors: kBadUsage, with the nearest name.

@@ -14,7 +14,9 @@
 
 DECLARE_string(out);
 DECLARE_bool(quiet);
-DEFINE_string(format, "", "kalibr, vins_mono, vins_fusion, openvins, gyroflow, euroc or json");
+// gflags keeps the pointer.
+static const std::string kFormatHelp = "one of " + camgyro::ExportFormatNames();
+DEFINE_string(format, "", kFormatHelp.c_str());
 DEFINE_string(recording, "",
               "the recording: noise densities and rates of its sensor.yaml and stamps; for "
               "gyroflow its gyro log");
@@ -23,12 +25,10 @@ namespace camgyro {
 namespace {
 
 Result<ExportFormat> FindFormat(const std::string& name) {
-  std::string names;
   for (const ExportFormat& format : ExportFormats()) {
     if (format.name == name) return format;
-    names += (names.empty() ? "" : ", ") + format.name;
   }
-  return BadUsage("--format=" + name + ": expected one of " + names);
+  return BadUsage("--format=" + name + ": expected one of " + ExportFormatNames());
 }
 
 std::string Join(const std::vector<std::string>& words) {
@@ -39,7 +39,7 @@ std::string Join(const std::vector<std::string>& words) {
 
 // What the files do not say, or say without grounds.
 std::vector<std::string> Caveats(const ExportInput& input, const std::vector<std::string>& effects,
-                                 const std::string& format) {
+                                 const ExportFormat& format) {
   std::vector<std::string> notes;
   std::vector<std::string> undetermined;
   for (size_t i = 0; i < kStateSize; ++i) {
@@ -58,10 +58,8 @@ std::vector<std::string> Caveats(const ExportInput& input, const std::vector<std
     }
   }
   if (!lost.empty()) notes.push_back("effects that this format does not hold: " + Join(lost));
-  if (format == "gyroflow" && !input.recording) {
-    notes.push_back(
-        "no gyro.gcsv without --recording; the offset is then for a log whose times are the gyro's "
-        "stamps and a video whose times are the camera's");
+  if (!input.recording && !format.without_recording.empty()) {
+    notes.push_back(format.without_recording);
   }
   return notes;
 }
@@ -102,7 +100,7 @@ Status RunExport(const std::vector<std::string>& arguments) {
   if (Status written = files.Write(); !written) return written;
   if (FLAGS_quiet) return {};
   std::printf("%swritten    %s/%s for %s\n",
-              Notes("note", Caveats(input, *effects, format->name)).c_str(), files.folder().c_str(),
+              Notes("note", Caveats(input, *effects, *format)).c_str(), files.folder().c_str(),
               Join(names).c_str(), format->program.c_str());
   return {};
 }
@@ -114,10 +112,7 @@ Command ExportCommand() {
   command.name = "export";
   command.arguments = "CALIBRATION";
   command.summary =
-      "a calibration for other programs, into --out: Kalibr, VINS-Mono, VINS-Fusion, OpenVINS, "
-      "Gyroflow, "
-      "EuRoC, "
-      "JSON (docs/export.md)";
+      "a calibration for other programs, into --out: " + ExportPrograms() + " (docs/export.md)";
   command.flags = {"format", "out", "recording", "quiet"};
   command.run = RunExport;
   return command;

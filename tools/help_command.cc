@@ -10,17 +10,9 @@ constexpr size_t kUsageWidth = 40;  // the longest is simulate's
 }  // namespace
 
 std::vector<Command> AllCommands() {
-  return {
-      CalibrateCommand(),  //
-      DiagnoseCommand(),   //
-      DelayCommand(),      //
-      TrackCommand(),      //
-      SimulateCommand(),   //
-      CompareCommand(),    //
-      ExportCommand(),     //
-      StabilizeCommand(),  //
-      HelpCommand(),
-  };
+#define CAMGYRO_ROW(name) name##Command(),
+  return {CAMGYRO_COMMANDS(CAMGYRO_ROW)};
+#undef CAMGYRO_ROW
 }
 
 Result<Command> FindCommand(const std::string& name) {

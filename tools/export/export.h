@@ -35,25 +35,16 @@ struct ExportFormat {
   std::string name;     // as in --format
   std::string program;  // whose files these are
   std::vector<ExportedFile> (*make)(const ExportInput& input);
+  std::string without_recording;  // a note where there is no recording; empty: nothing is lost
 };
 
-// All formats, in the order of the help.
+// All formats, in the order of the help. A new one is a file of this folder and a row of the table
+// in export.cc.
 const std::vector<ExportFormat>& ExportFormats();
 
-// camchain-imucam.yaml, imu.yaml.
-std::vector<ExportedFile> ExportKalibr(const ExportInput& input);
-// vins_mono.yaml.
-std::vector<ExportedFile> ExportVinsMono(const ExportInput& input);
-// vins_fusion.yaml, cam0_pinhole.yaml.
-std::vector<ExportedFile> ExportVinsFusion(const ExportInput& input);
-// estimator_config.yaml, kalibr_imucam_chain.yaml, kalibr_imu_chain.yaml.
-std::vector<ExportedFile> ExportOpenVins(const ExportInput& input);
-// lens_profile.json, sync.gyroflow; with a recording gyro.gcsv, in the axes of the camera.
-std::vector<ExportedFile> ExportGyroflow(const ExportInput& input);
-// cam0/sensor.yaml, imu0/sensor.yaml: also camgyro's own initial guess.
-std::vector<ExportedFile> ExportEuroc(const ExportInput& input);
-// calibration.json: everything, covariance included.
-std::vector<ExportedFile> ExportJson(const ExportInput& input);
+// The column `name`, or `program`, of all formats, separated by commas.
+std::string ExportFormatNames();
+std::string ExportPrograms();
 
 // Delay of the row in the middle of the picture, v = h / 2 [s].
 inline double MiddleRowDelayS(const Calibration& c) { return c.delay_s + 0.5 * c.readout_s; }
