@@ -1,8 +1,8 @@
 #!/bin/bash
-# tools/benchmark.sh [CAMGYRO]: runs the benchmark and writes docs/benchmark.md, with the text of
-# docs/benchmark_notes.md in front, and docs/benchmark_*.svg. SEEDS: runs per scenario (8); JOBS:
+# tools/benchmark.sh [CAMGYRO]: runs the benchmark and writes docs/lab/benchmark.md, with the text
+# of benchmark_notes.md in front, and benchmark_*.svg beside it. SEEDS: runs per scenario (8); JOBS:
 # processes at a time (all cores). The measured recordings are in $CAMGYRO_DATA (../shared/data).
-# tools/benchmark.sh --residuals [CAMGYRO]: only the section of that name, anew in docs/benchmark.md.
+# tools/benchmark.sh --residuals [CAMGYRO]: only the section of that name, anew in that file.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 only=
@@ -68,18 +68,18 @@ if [[ $only == residuals ]]; then
   awk -v section="$work/section.md" '
     /^## / { skip = 0 }
     /^## Residuals, with/ { skip = 1; while ((getline line < section) > 0) print line }
-    !skip' docs/benchmark.md > "$work/benchmark.md"
-  mv "$work/benchmark.md" docs/benchmark.md
+    !skip' docs/lab/benchmark.md > "$work/benchmark.md"
+  mv "$work/benchmark.md" docs/lab/benchmark.md
   exit
 fi
 
 {
-  cat docs/benchmark_notes.md
+  cat docs/lab/benchmark_notes.md
   printf '\n## Simulated, 0.5 px\n'
   compare walking running slow panning rotation --seeds="$seeds" tracks.noise_px=0.5 \
     --ekf_sigma_px=0.5
-  cp "$work/out/errors_running.svg" docs/benchmark_running.svg
-  cp "$work/out/errors_panning.svg" docs/benchmark_panning.svg
+  cp "$work/out/errors_running.svg" docs/lab/benchmark_running.svg
+  cp "$work/out/errors_panning.svg" docs/lab/benchmark_panning.svg
   printf '## Simulated, 1 px\n'
   compare walking running slow --seeds="$seeds"
   printf '## Simulated, 0.05 px: tracks as good as those of the paper\n'
@@ -96,4 +96,4 @@ fi
     (cd "$data" && compare ov_handheld_gs ov_handheld_rs ov_handheld_rs_skew)
   fi
 } > "$work/benchmark.md"
-mv "$work/benchmark.md" docs/benchmark.md
+mv "$work/benchmark.md" docs/lab/benchmark.md

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""Runs `camgyro diagnose` on every measured recording and writes docs/closed_loop.md with plots.
+"""Runs `camgyro diagnose` on every measured recording; writes docs/lab/closed_loop.md with plots.
 
     tools/closed_loop.py [path of camgyro]        (default: build/release/tools/camgyro)
 
-The recordings lie in $CAMGYRO_DATA (default: ../shared/data beside the source). docs/
+The recordings lie in $CAMGYRO_DATA (default: ../shared/data beside the source). docs/lab/
 closed_loop_notes.md, the stories, is put in front of the tables word by word.
 """
 import csv
@@ -154,7 +154,7 @@ def plot_over_axis(results, name, map_name, parts, scale, labels, file):
     axes[0][0].set_ylabel(labels[1])
     axes[0][0].legend(frameon=False)
     figure.suptitle("%s: %s" % (name, map_name))
-    figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
+    figure.savefig(os.path.join(SOURCE, "docs/lab", file), metadata={"Date": None})
     plt.close(figure)
 
 
@@ -189,7 +189,7 @@ def plot_image(results, name, file):
         axis.set_xlabel("u [px]")
     axes[0].set_ylabel("v [px]")
     figure.suptitle(name + ": shift over the image that the model lacks")
-    figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
+    figure.savefig(os.path.join(SOURCE, "docs/lab", file), metadata={"Date": None})
     plt.close(figure)
 
 
@@ -228,7 +228,7 @@ def plot_lens(results, file):
     axis.set_ylabel("radius, less that of\nBasalt's double sphere [px]")
     axis.legend(frameon=False)
     figure.suptitle("euroc-v101-flight: two calibrations against a third")
-    figure.savefig(os.path.join(SOURCE, "docs", file), metadata={"Date": None})
+    figure.savefig(os.path.join(SOURCE, "docs/lab", file), metadata={"Date": None})
     plt.close(figure)
     return "Against Basalt's double sphere calibration of euroc's camera: %s.\n" % "; ".join(said)
 
@@ -247,10 +247,10 @@ def write(results):
     plot_image(results, "euroc-v101-flight", "closed_loop_euroc.svg")
     lens = plot_lens(results, "closed_loop_lens.svg")
     missing = [name for name in NAMES if name not in [r["name"] for r in results]]
-    with open(SOURCE + "/docs/closed_loop.md", "w", encoding="utf-8") as out:
+    with open(SOURCE + "/docs/lab/closed_loop.md", "w", encoding="utf-8") as out:
         out.write("# The closed loop on measured data\n\nMade by `tools/closed_loop.py`; the text "
-                  "before the tables is `docs/closed_loop_notes.md`.\n\n")
-        with open(SOURCE + "/docs/closed_loop_notes.md", encoding="utf-8") as notes:
+                  "before the tables is `docs/lab/closed_loop_notes.md`.\n\n")
+        with open(SOURCE + "/docs/lab/closed_loop_notes.md", encoding="utf-8") as notes:
             out.write(notes.read())
         out.write("\n## Before and after\n\nIn frames that neither the fit nor the choice of the "
                   "effect has seen; rms in px (tablet-attitude: mrad), chi2 per residual, both with "

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""Diagnoses simulated recordings and writes docs/diagnosis_simulated.md: every effect, undeclared;
-two effects at once; clean recordings, on which nothing may be named.
+"""Diagnoses simulated recordings and writes docs/lab/diagnosis_simulated.md: every effect,
+undeclared; two effects at once; clean recordings, on which nothing may be named.
 
     tools/diagnose_simulated.py [--seeds A-B] [--effects NAME,...] [--duration S] [--pairs A-B]
                                 [--clean A-B] [--clean_duration S] [--jobs N] [--camgyro PATH]
                                 [--write]
 
-Every run becomes a line of docs/diagnosis_simulated.jsonl, with the commit of the sources; a later
-run of the same case takes its place. The document is made of all lines, so that a long series can
+Every run becomes a line of docs/lab/diagnosis_simulated.jsonl, with the commit of the sources; a
+later run of the same case takes its place. The document is made of all lines, so that a long series can
 be run in parts (all of it takes hours): --seeds 1-3 now, --seeds 4-10 later, --seeds 0 for none.
 --write only writes the document. Sizes are those of tools/scenarios/effect_*.yaml. The reference is
 `calibrate` with the effect declared ("informed"), in the shape that the diagnosis found, if it did.
@@ -361,7 +361,7 @@ def main():
     parser.add_argument("--clean_duration", type=float, default=14.0)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
-    parser.add_argument("--out", default=SOURCE + "/docs/diagnosis_simulated.md")
+    parser.add_argument("--out", default=SOURCE + "/docs/lab/diagnosis_simulated.md")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     store = options.out.replace(".md", ".jsonl")

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Runs `camgyro calibrate` on every measured recording and writes docs/measured.md.
+"""Runs `camgyro calibrate` on every measured recording and writes docs/lab/measured.md.
 
     tools/measure.py [path of camgyro]        (default: build/release/tools/camgyro)
 
 The recordings lie in $CAMGYRO_DATA (default: ../shared/data beside the source). What is known of
-them independently is written down below; the estimator never sees it. docs/measured_notes.md is
+them independently is written down below; the estimator never sees it. docs/lab/measured_notes.md is
 put in front of the tables word by word. Standard library only.
 """
 import csv
@@ -226,11 +226,11 @@ def main():
                 quality.append(quality_row(label, r))
             if "online" in r:
                 online.append(online_row(label, truth, r))
-    notes = os.path.join(SOURCE, "docs/measured_notes.md")
+    notes = os.path.join(SOURCE, "docs/lab/measured_notes.md")
     preamble = open(notes).read().rstrip() + "\n\n" if os.path.exists(notes) else ""
-    with open(os.path.join(SOURCE, "docs/measured.md"), "w") as out:
+    with open(os.path.join(SOURCE, "docs/lab/measured.md"), "w") as out:
         out.write("# Measured recordings\n\nMade by `tools/measure.py`; the text before the tables "
-                  "is `docs/measured_notes.md`.\n\n" + preamble)
+                  "is `docs/lab/measured_notes.md`.\n\n" + preamble)
         out.write("## Values\n\nvalue ± sigma / what is known independently. In brackets: not "
                   "determined by this motion, says the program. q_c: angle to the known mounting, "
                   "and the norm of its three sigmas. *: a fit of ours, not independent. Exit code "
@@ -245,7 +245,7 @@ def main():
                   "± its sigma; errors against what is known, and their ratio.\n\n"
                   "| Recording | f [px] | t_r [ms] | t_d [ms] | q_c [deg] |\n|" + " --- |" * 5
                   + "\n" + "\n".join(online) + "\n")
-    print("docs/measured.md written after %.0f s" % (time.time() - begin))
+    print("docs/lab/measured.md written after %.0f s" % (time.time() - begin))
 
 
 if __name__ == "__main__":

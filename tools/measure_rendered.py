@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Renders video scenarios, calibrates them from their pictures, and writes docs/rendered.md.
+"""Renders video scenarios, calibrates them from their pictures, and writes docs/lab/rendered.md.
 
     tools/measure_rendered.py [path of camgyro]        (default: build/release/tools/camgyro)
 
@@ -61,7 +61,7 @@ def main():
              "angle of q_c [deg]", "noise [px]", "mean squared error [sigma²]"), ("---",) * 7,
             *(row for row, _ in measured), LIMITS]
     in_sigmas = np.array([e for _, e in measured])
-    with open(SOURCE + "/docs/rendered.md", "w", encoding="utf-8") as out:
+    with open(SOURCE + "/docs/lab/rendered.md", "w", encoding="utf-8") as out:
         out.write("# Calibration from rendered video\n\nMade by `tools/measure_rendered.py`: "
                   "scenarios of `tools/scenarios`, 20 s of 640 x 480 at 30 frames/s, rendered row "
                   "by row with motion blur, photon noise and vignetting, encoded as H.264, tracked "

@@ -255,7 +255,7 @@ TEST_F(CommandsTest, DiagnoseMeasuredLens) {
   EXPECT_EQ(round["added"].as<std::string>(), "radial_distortion");
   EXPECT_LT(round["unseen_rms_px"]["after"].as<double>(),
             0.5 * round["unseen_rms_px"]["before"].as<double>());
-  // Published: 457.3. What is left of the error is in docs/measured.md.
+  // Published: 457.3. What is left of the error is in docs/lab/measured.md.
   const YAML::Node calibration = YAML::LoadFile(Path("result/calibration.yaml"));
   EXPECT_NEAR(calibration["camera"]["focal_px"]["value"].as<double>(), 457.3, 0.025 * 457.3);
 }

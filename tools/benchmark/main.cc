@@ -1,4 +1,4 @@
-// vins_benchmark: the tables of docs/vins.md.
+// vins_benchmark: the tables of docs/lab/vins.md.
 #include <gflags/gflags.h>
 #include <glog/logging.h>
 
