@@ -1,5 +1,5 @@
 // Lens: pixel -> ray in the camera frame (x right, y down, z forward), with the derivatives that
-// the propagation of noise needs. Part 1 of the measurement function (design.md section 2).
+// the propagation of noise needs. Part 1 of the measurement function (docs/architecture.md).
 #ifndef CAMGYRO_CORE_LENS_H_
 #define CAMGYRO_CORE_LENS_H_
 

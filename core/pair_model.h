@@ -1,5 +1,5 @@
 // The measurement function of one observation within a pair of frames: lens, shutter clock and
-// rates composed (design.md section 2), with the derivative by the pixel, so that pixel noise is
+// rates composed (docs/architecture.md), with the derivative by the pixel, so that pixel noise is
 // propagated through all of it, and with back-propagation of any scalar to every parameter.
 #ifndef CAMGYRO_CORE_PAIR_MODEL_H_
 #define CAMGYRO_CORE_PAIR_MODEL_H_

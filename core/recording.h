@@ -61,7 +61,7 @@ struct CameraRotation {
   double sigma_rad = 0.0;  // per axis, as far as the maker knows it
 };
 
-// Where the pixel noise of a match sits (D 5, "shared observations").
+// Where the pixel noise of a match sits (docs/architecture.md, traps).
 enum class MatchNoise {
   kBothImages,   // each observation has its own independent error
   kSecondImage,  // tracker re-anchored at every frame: the first image is the definition

@@ -55,8 +55,8 @@ using BendVector = Eigen::Matrix<double, 6, 1>;
 // Residual    one per match, in sigmas. sigma_i is propagated through lens, readout and rotation,
 //             and differentiated with them.
 // Valid       while every pixel has a ray; otherwise the step is rejected
-// Source      Jia & Evans eq. (2)-(6); design.md section 3 and 5. Neglects: second-order noise,
-//             a jerk that changes within the pair
+// Source      Jia & Evans eq. (2)-(6); docs/architecture.md, residuals and traps. Neglects:
+//             second-order noise, a jerk that changes within the pair
 class CoplanarityPlane final : public ceres::CostFunction {
  public:
   explicit CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair);

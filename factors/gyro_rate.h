@@ -18,8 +18,8 @@ namespace camgyro {
 //             bias_gyro_rad_s    3     gyro frame
 //             effects            e, if there are any (core/effects)
 // Residual    3 n, in sigmas
-// Source      design.md section 1 and 3: w_measured = w_true + b_g + noise. (Eq. (8) of Jia &
-//             Evans writes the bias with the opposite sign.)
+// Source      docs/architecture.md, conventions: w_measured = w_true + b_g + noise. (Eq. (8) of
+//             Jia & Evans writes the bias with the opposite sign.)
 class GyroRate final : public ceres::CostFunction {
  public:
   // measured: one reading per column [rad/s]; sigma_rad_s > 0: white noise of one

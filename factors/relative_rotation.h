@@ -21,8 +21,8 @@ namespace camgyro {
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    3, in sigmas, in the gyro frame of the second exposure
 // Valid       while the argument of Log turns by less than pi - 0.1 rad; the caller gates
-// Source      Feng, Li & Dai eq. (2); design.md section 3. Neglects: that two neighbouring camera
-//             rotations share the error of the attitude between them
+// Source      Feng, Li & Dai eq. (2); docs/architecture.md, residuals. Neglects: that two
+//             neighbouring camera rotations share the error of the attitude between them
 class RelativeRotation final : public ceres::CostFunction {
  public:
   struct Measurement {

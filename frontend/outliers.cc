@@ -42,7 +42,7 @@ double TruncatedCost(const std::vector<CoplanarityNormal>& normals, const Eigen:
 }
 
 // Gauss-Newton on the inliers, with the derivative of the denominator: without it the iteration
-// runs to a point that is no minimum (design.md section 5).
+// runs to a point that is no minimum (docs/architecture.md, traps).
 Eigen::Vector3d RefineTranslation(const std::vector<CoplanarityNormal>& normals, double max_sq,
                                   Eigen::Vector3d tau) {
   double cost = TruncatedCost(normals, tau, max_sq);

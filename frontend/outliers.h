@@ -33,9 +33,9 @@ struct RotatedMatch {
 
 // n = a x b and its covariance for a pixel noise of 1 px (per axis, in the images that `noise`
 // says). With right rotations every n is normal to the translation tau, so
-//   r(tau) = tau . n / (sigma_px sqrt(tau' cov_n tau))                          (design.md 3)
-// is the match's distance from its epipolar line in sigmas. It stays meaningful without parallax,
-// where a, b and every n are no more than noise.
+//   r(tau) = tau . n / (sigma_px sqrt(tau' cov_n tau))
+// is the match's distance from its epipolar line in sigmas (docs/architecture.md, residuals). It
+// stays meaningful without parallax, where a, b and every n are no more than noise.
 struct CoplanarityNormal {
   Eigen::Vector3d n;
   Eigen::Matrix3d cov_n;

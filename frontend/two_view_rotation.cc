@@ -171,8 +171,8 @@ class JointProblem {
   // normal equations of the inliers. Nothing if they do not determine it.
   //
   // Noise in the normals looks like parallax and inflates the information on tau (errors in
-  // variables, design.md section 5). Its expectation is taken off again, up to half: the rest is
-  // needed where there is no parallax at all.
+  // variables: docs/architecture.md, traps). Its expectation is taken off again, up to half: the
+  // rest is needed where there is no parallax at all.
   RotationFit FitWithCovariance(const Motion& motion, const RobustLoss& loss) {
     RotationFit fit;
     fit.R_a_b = motion.R_a_b;

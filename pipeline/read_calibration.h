@@ -1,4 +1,4 @@
-// Reads a calibration.yaml back (design.md section 7).
+// Reads a calibration.yaml back (docs/result_format.md).
 #ifndef CAMGYRO_PIPELINE_READ_CALIBRATION_H_
 #define CAMGYRO_PIPELINE_READ_CALIBRATION_H_
 

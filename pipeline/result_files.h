@@ -1,4 +1,4 @@
-// The files of a result: calibration.yaml, trace.csv, delay.csv (design.md section 7).
+// The files of a result: calibration.yaml, trace.csv, delay.csv (docs/result_format.md).
 #ifndef CAMGYRO_PIPELINE_RESULT_FILES_H_
 #define CAMGYRO_PIPELINE_RESULT_FILES_H_
 

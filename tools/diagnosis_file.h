@@ -8,7 +8,7 @@
 
 namespace camgyro {
 
-// diagnosis.yaml (design.md section 7).
+// diagnosis.yaml (docs/result_format.md).
 std::string DiagnosisYaml(const Diagnosis& diagnosis);
 
 // residual_maps.csv: every cell of every map, before and after the effects.

@@ -13,7 +13,7 @@
 
 namespace camgyro {
 
-// All effects, in the order of design.md section 6.
+// All effects (docs/effects.md).
 const std::vector<EffectEntry>& EffectCatalogue();
 
 // Null if there is none of this name.

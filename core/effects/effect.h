@@ -1,5 +1,5 @@
 // One effect of the catalogue: a way in which cameras and gyros differ from the plain model, as a
-// linear change of one part of the measurement function (design.md sections 2 and 6).
+// linear change of one part of the measurement function (docs/architecture.md).
 #ifndef CAMGYRO_CORE_EFFECTS_EFFECT_H_
 #define CAMGYRO_CORE_EFFECTS_EFFECT_H_
 

@@ -1,5 +1,5 @@
 // The closed loop: fit, find what is left in frames that the fit has not seen, name the effect that
-// explains it, add it, and report the error before and after (design.md section 6).
+// explains it, add it, and report the error before and after (docs/architecture.md).
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_DIAGNOSE_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_DIAGNOSE_H_
 

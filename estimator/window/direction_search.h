@@ -1,5 +1,5 @@
-// The translation direction of one pair at a given calibration: the inner minimisation that trap
-// one of design.md section 5 warns of.
+// The translation direction of one pair at a given calibration: the inner minimisation. It is
+// searched, not iterated (docs/architecture.md, traps).
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_DIRECTION_SEARCH_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_DIRECTION_SEARCH_H_
 

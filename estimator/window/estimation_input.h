@@ -41,11 +41,11 @@ constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
 
 // The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
 // observation does not, so that neighbours tell least, and are biased where their parallax is as
-// small as the noise (docs/benchmark.md). The gap is the longest up to 0.2 s that keeps 60 % of the
-// neighbours' matches and leaves `least_pairs`. No two pairs share noise: gaps are odd and pairs
-// begin at even frames, so that every observation is in one pair. Neighbours without tracks, and
-// where a tracker re-anchors at every frame (MatchNoise::kSecondImage): its error grows with the
-// gap as fast as what is to be seen.
+// small as the noise (docs/lab/benchmark.md). The gap is the longest up to 0.2 s that keeps 60 % of
+// the neighbours' matches and leaves `least_pairs`. No two pairs share noise: gaps are odd and
+// pairs begin at even frames, so that every observation is in one pair. Neighbours without tracks,
+// and where a tracker re-anchors at every frame (MatchNoise::kSecondImage): its error grows with
+// the gap as fast as what is to be seen.
 PairSelection SelectPairs(const Recording& recording, int longest_gap = 10, int least_pairs = 100);
 
 // Pairs from matches, tracks (which of them: `selection`) or attitudes. Matches come in the pairs

@@ -119,7 +119,7 @@ struct VideoOptions {
   int crf = 18;  // H.264 quality, 0 (lossless) to 51
 };
 
-// The catalogue of design.md section 6, all absent by default. Causes and realistic sizes of each
+// The catalogue (docs/effects.md), all absent by default. Causes and realistic sizes of each
 // are in docs/simulate.md. Times t are seconds after the first gyro stamp, on the gyro clock.
 struct Effects {
   struct Lens {

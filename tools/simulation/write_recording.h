@@ -1,4 +1,4 @@
-// Writes a simulated recording as files, in the layout of design.md section 7.
+// Writes a simulated recording as files, in the layout of docs/recording_format.md.
 #ifndef CAMGYRO_TOOLS_SIMULATION_WRITE_RECORDING_H_
 #define CAMGYRO_TOOLS_SIMULATION_WRITE_RECORDING_H_
 

@@ -1,4 +1,5 @@
-// The track level against projections written here from the definitions of design.md section 1.
+// The track level against projections written here from the conventions of
+// docs/architecture.md.
 #include "tools/simulation/simulate.h"
 
 #include <gmock/gmock.h>
