@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/commands.h"
+#include "tools/report/build_info.h"
 
 namespace camgyro {
 namespace {
@@ -17,6 +18,10 @@ Status Run(const std::vector<std::string>& words) {
     return BadUsage("no command given");
   }
   if (words[0] == "--help" || words[0] == "-h") return HelpCommand().run({});
+  if (words[0] == "--version") {
+    std::printf("camgyro %s (commit %s; %s)\n", kVersion, kGitCommit, kPlatform);
+    return {};
+  }
   const Result<Command> command = FindCommand(words[0]);
   if (!command) return tl::unexpected(command.error());
   const Result<ParsedCommandLine> parsed =

@@ -1,12 +1,10 @@
 // prepare_vio RECORDING DIR: calibrates, and writes what a VIO needs of it.
-//   calibration.yaml   in camgyro's format: `camgyro export` makes VINS-Fusion and OpenVINS files
-//   of
-//                      it
-//   image_times.csv    each frame's time on the gyro's clock: of its first row (for a VIO that
-//   knows
-//                      the rolling shutter) and of its middle row (for one that does not). With
-//                      these stamps the VIO's td starts at zero
-//   readiness.csv      each parameter with its sigma, and whether it is good enough
+// - calibration.yaml is in camgyro's format: `camgyro export` makes VINS-Fusion and OpenVINS files
+//   of it.
+// - image_times.csv has each frame's time on the gyro's clock: of its first row (for a VIO that
+//   knows the rolling shutter) and of its middle row (for one that does not). With these stamps the
+//   VIO's td starts at zero.
+// - readiness.csv has each parameter with its sigma, and whether it is good enough.
 #include <camgyro/calibrator.h>
 
 #include <cmath>

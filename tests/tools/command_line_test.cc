@@ -4,12 +4,14 @@
 
 #include "tests/tools/run_camgyro.h"
 #include "tools/commands.h"
+#include "tools/report/build_info.h"
 
 namespace camgyro {
 namespace {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::MatchesRegex;
 using testing::Not;
 
 using CommandLineTest = CamgyroTest;
@@ -83,16 +85,23 @@ TEST_F(CommandLineTest, HelpListsEveryCommandAndItsFlags) {
   }
 }
 
-// The pages quote the help word by word.
+TEST_F(CommandLineTest, VersionSaysWhichBuildThisIs) {
+  const RunResult result = Run("--version");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(kVersion, MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+"));
+  EXPECT_EQ(result.out, std::string("camgyro ") + kVersion + " (commit " + kGitCommit + "; " +
+                            kPlatform + ")\n");
+}
+
+// Every command but help has a page, which quotes its help word by word.
 TEST_F(CommandLineTest, DocumentationQuotesTheHelp) {
-  for (const char* name :
-       {"calibrate", "diagnose", "track", "delay", "simulate", "compare", "export", "stabilize"}) {
-    SCOPED_TRACE(name);
-    std::stringstream help(Run("help " + std::string(name)).out);
+  for (const Command& command : AllCommands()) {
+    if (command.name == "help") continue;
+    SCOPED_TRACE(command.name);
+    std::stringstream help(Run("help " + command.name).out);
     std::string quoted, line;
     while (std::getline(help, line)) quoted += (line.empty() ? "" : "    " + line) + "\n";
-    EXPECT_THAT(ReadFile(std::string(CAMGYRO_SOURCE_DIR "/docs/") + name + ".md"),
-                HasSubstr(quoted));
+    EXPECT_THAT(ReadFile(CAMGYRO_SOURCE_DIR "/docs/" + command.name + ".md"), HasSubstr(quoted));
   }
 }
 

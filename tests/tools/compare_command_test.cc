@@ -183,13 +183,6 @@ TEST_F(CompareTest, BadInputIsThreeAndSaysWhat) {
   EXPECT_THAT(run.err, HasSubstr("a: no truth: a/truth.yaml is not there"));
 }
 
-TEST_F(CompareTest, DocumentationQuotesTheHelp) {
-  std::stringstream help(Run("help compare").out);
-  std::string quoted, line;
-  while (std::getline(help, line)) quoted += (line.empty() ? "" : "    " + line) + "\n";
-  EXPECT_THAT(ReadFile(CAMGYRO_SOURCE_DIR "/docs/compare.md"), HasSubstr(quoted));
-}
-
 // Over many seeds, the start's errors have the prior's standard deviations.
 TEST(MakeInput, DrawsStartsFromThePrior) {
   const Case from =
