@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "frontend/readers/ffmpeg.h"
+#include "frontend/readers/formats.h"
 #include "frontend/readers/image_file.h"
-#include "frontend/readers/rosbag_reader.h"
 #include "frontend/readers/text.h"
 #include "frontend/readers/video_container.h"
 
@@ -195,8 +195,9 @@ Result<std::unique_ptr<FrameSource>> OpenFrames(const Recording& recording, Pict
     return BadInput(Concat(recording.path, ": has no pictures, expected images or a video"));
   }
   if (recording.video_file.empty()) return std::make_unique<ImageFrames>(recording, format);
-  if (IsRosbag(recording.video_file)) {
-    if (format == PictureFormat::kGray) return OpenRosbagFrames(recording);
+  const RecordingFormat* container = FindFormat(recording.video_file);
+  if (container != nullptr && container->open_frames != nullptr) {
+    if (format == PictureFormat::kGray) return container->open_frames(recording);
     return BadInput(Concat(recording.path, ": pictures of a bag are read in grey only"));
   }
   auto frames = std::make_unique<VideoFrames>(recording, format);

@@ -1,11 +1,19 @@
+#include <algorithm>
 #include <cstdio>
 
+#include "frontend/readers/formats.h"
 #include "tools/commands.h"
 
 namespace camgyro {
 namespace {
 
-constexpr size_t kUsageWidth = 40;  // the longest is simulate's
+constexpr size_t kUsageWidth = 40;   // the longest is simulate's
+constexpr size_t kFormatWidth = 21;  // of their names
+
+std::string PadRight(std::string text, size_t width) {
+  text.resize(std::max(width, text.size() + 1), ' ');
+  return text;
+}
 
 }  // namespace
 
@@ -32,13 +40,17 @@ std::string ProgramHelp() {
       "camgyro: calibrates and synchronises a rolling-shutter camera with a gyroscope\n\n";
   for (const Command& command : AllCommands()) {
     const std::string usage = command.name + " " + command.arguments;
-    help += "  camgyro " + usage + std::string(kUsageWidth - usage.size(), ' ');
+    help += "  camgyro " + PadRight(usage, kUsageWidth);
     help += command.summary.substr(0, command.summary.find(':')) + "\n";
   }
+  help += "\nA recording is one of these (docs/recording_format.md):\n";
+  for (const RecordingFormat& format : RecordingFormats()) {
+    help += "  " + PadRight(format.name, kFormatWidth) + format.looks_like;
+    help += format.read == nullptr ? " (not in this build)\n" : "\n";
+  }
   help +=
-      "\n`camgyro help COMMAND` lists its flags. A recording is a folder, ours or of an app for\n"
-      "phones, a GoPro MP4, a .gcsv or a ROS bag (docs/recording_format.md). Exit codes: 0 done;\n"
-      "2 bad usage; 3 bad input; 4 could not estimate.\n";
+      "\n`camgyro help COMMAND` lists its flags. Exit codes: 0 done; 2 bad usage; 3 bad input;\n"
+      "4 could not estimate.\n";
   return help;
 }
 

@@ -9,10 +9,9 @@
 
 namespace camgyro {
 
-// Reads a recording in any layout of docs/recording_format.md: a folder (EuRoC/ASL, with or without
-// mav0/), a GoPro MP4 with GPMF telemetry inside, a .gcsv with its video, the folder of a logger
-// for phones, or a ROS bag. Images are not decoded here (see frame_source.h). Every complaint names
-// the file, the line, and what was expected there.
+// Reads a recording in any format of docs/recording_format.md; formats.h has the table of them.
+// Images are not decoded here (see frame_source.h). Every complaint names the file, the line, and
+// what was expected there.
 Result<Recording> ReadRecording(const std::string& path);
 
 }  // namespace camgyro

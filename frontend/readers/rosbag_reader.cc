@@ -243,10 +243,6 @@ class RosbagFrames : public FrameSource {
 
 }  // namespace
 
-bool IsRosbag(const std::string& path) {
-  return path.size() > 4 && path.compare(path.size() - 4, 4, ".bag") == 0;
-}
-
 Result<Recording> ReadRosbag(const std::string& path) {
   return Guard<Recording>(path, [&]() -> Result<Recording> {
     rosbag::Bag bag;

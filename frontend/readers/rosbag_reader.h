@@ -1,4 +1,4 @@
-// ROS 1 bags (format 2.0), through librosbag: the build has it or has not.
+// ROS 1 bags (format 2.0), through librosbag. Of builds that have it: see formats.cc.
 #ifndef CAMGYRO_FRONTEND_READERS_ROSBAG_READER_H_
 #define CAMGYRO_FRONTEND_READERS_ROSBAG_READER_H_
 
@@ -11,12 +11,10 @@
 
 namespace camgyro {
 
-bool IsRosbag(const std::string& path);
-
 // Gyro and accelerometer of the sensor_msgs/Imu topic, frames of the sensor_msgs/Image or
 // CompressedImage topic; of several the first by name, noted. Stamps are those of the headers. The
 // pictures stay in the bag (Recording::video_file) until OpenRosbagFrames. Errors: not a bag, or
-// one that was not closed; no such topic; stamps that do not increase; a build without librosbag.
+// one that was not closed; no such topic; stamps that do not increase.
 Result<Recording> ReadRosbag(const std::string& path);
 
 // The pictures of a recording from ReadRosbag, which must outlive the source. Encodings: mono8,

@@ -24,6 +24,10 @@ inline std::string_view Trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
+inline bool EndsWith(std::string_view text, std::string_view ending) {
+  return text.size() >= ending.size() && text.substr(text.size() - ending.size()) == ending;
+}
+
 // True if the whole text is one number of type T. Locale-independent.
 template <typename T>
 bool ParseNumber(std::string_view text, T* value) {

@@ -165,10 +165,6 @@ Status MergeFrames(const std::string& file, const std::vector<video_imu::FrameIn
 
 }  // namespace
 
-bool IsVideoImuCapture(const std::string& folder) {
-  return fs::is_regular_file(fs::path(folder) / "video_meta.pb3");
-}
-
 Result<Recording> ReadVideoImuCapture(const std::string& folder) {
   const std::string meta = (fs::path(folder) / "video_meta.pb3").string();
   const std::string video = (fs::path(folder) / "video_recording.mp4").string();

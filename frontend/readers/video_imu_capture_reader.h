@@ -1,5 +1,5 @@
-// Folders of VideoIMUCapture (github.com/DavidGillsjo/VideoIMUCapture-Android). Needs protobuf: the
-// build has it or has not.
+// Folders of VideoIMUCapture (github.com/DavidGillsjo/VideoIMUCapture-Android). Of builds
+// that have protobuf: see formats.cc.
 #ifndef CAMGYRO_FRONTEND_READERS_VIDEO_IMU_CAPTURE_READER_H_
 #define CAMGYRO_FRONTEND_READERS_VIDEO_IMU_CAPTURE_READER_H_
 
@@ -10,15 +10,11 @@
 
 namespace camgyro {
 
-// True if the folder holds video_meta.pb3.
-bool IsVideoImuCapture(const std::string& folder);
-
 //   video_meta.pb3       gyro, accelerometer, and stamp, exposure, readout of numbered pictures
 //   video_recording.mp4  the pictures
 // A picture that video_meta.pb3 does not number gets the container's stamp, moved to the other
 // clock as its fellows are (noted). Initial guesses: focal length and readout, medians. Declared
-// stabilisation is taken. Errors name the record and its byte in the file; and one says so if this
-// build is without protobuf.
+// stabilisation is taken. Errors name the record and its byte in the file.
 Result<Recording> ReadVideoImuCapture(const std::string& folder);
 
 }  // namespace camgyro

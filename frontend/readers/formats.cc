@@ -1,0 +1,87 @@
+#include "frontend/readers/formats.h"
+
+#include <filesystem>
+
+#include "frontend/readers/folder_reader.h"
+#include "frontend/readers/gcsv_reader.h"
+#include "frontend/readers/gopro_reader.h"
+#include "frontend/readers/mars_logger_reader.h"
+#include "frontend/readers/open_camera_reader.h"
+#include "frontend/readers/rosbag_reader.h"
+#include "frontend/readers/sensor_logger_reader.h"
+#include "frontend/readers/text.h"
+#include "frontend/readers/video_imu_capture_reader.h"
+
+namespace camgyro {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The readers that a build may be without (frontend/CMakeLists.txt).
+#ifdef CAMGYRO_WITH_PROTOBUF
+constexpr auto kReadVideoImuCapture = &ReadVideoImuCapture;
+#else
+constexpr Result<Recording> (*kReadVideoImuCapture)(const std::string&) = nullptr;
+#endif
+#ifdef CAMGYRO_WITH_ROSBAG
+constexpr auto kReadRosbag = &ReadRosbag;
+constexpr auto kOpenRosbagFrames = &OpenRosbagFrames;
+#else
+constexpr Result<Recording> (*kReadRosbag)(const std::string&) = nullptr;
+constexpr Result<std::unique_ptr<FrameSource> > (*kOpenRosbagFrames)(const Recording&) = nullptr;
+#endif
+
+bool HasFile(const std::string& folder, const char* name) {
+  return fs::is_regular_file(fs::path(folder) / name);
+}
+
+bool IsOwnFolder(const std::string& path) {
+  return fs::is_directory(fs::path(path) / "cam0") || fs::is_directory(fs::path(path) / "mav0");
+}
+
+}  // namespace
+
+const std::vector<RecordingFormat>& RecordingFormats() {
+  static const std::vector<RecordingFormat> formats = {
+      {"EuRoC/ASL folder", "a folder with cam0/ and imu0/, or mav0/ with them inside", IsOwnFolder,
+       ReadFolder},
+      {"VideoIMUCapture", "a folder with video_meta.pb3",
+       [](const std::string& path) { return HasFile(path, "video_meta.pb3"); },
+       kReadVideoImuCapture, "libprotobuf-dev and protobuf-compiler"},
+      {"MARSLogger", "a folder with gyro_accel.csv", IsMarsLogger, ReadMarsLogger},
+      {"Sensor Logger", "a folder with Gyroscope.csv or GyroscopeUncalibrated.csv", IsSensorLogger,
+       ReadSensorLogger},
+      {"OpenCamera Sensors", "a folder with VIDEO_gyro.csv and VIDEO_timestamps.csv", IsOpenCamera,
+       ReadOpenCamera},
+      {"ROS 1 bag", "X.bag", [](const std::string& path) { return EndsWith(path, ".bag"); },
+       kReadRosbag, "librosbag-storage-dev and libsensor-msgs-dev", kOpenRosbagFrames},
+      {"Gyroflow", "X.gcsv, or a video with X.gcsv beside it", IsGcsv, ReadGcsv},
+      {"GoPro MP4", "a video with GPMF telemetry inside",
+       [](const std::string& path) { return fs::is_regular_file(path); }, ReadGoPro},
+  };
+  return formats;
+}
+
+const RecordingFormat* FindFormat(const std::string& path) {
+  for (const RecordingFormat& format : RecordingFormats()) {
+    if (format.matches(path)) return &format;
+  }
+  return nullptr;
+}
+
+Status CheckBuilt(const RecordingFormat& format, const std::string& path) {
+  if (format.read != nullptr) return {};
+  return BadInput(Concat(path, ": a recording of the format ", format.name,
+                         "; this camgyro was built without the library that reading it needs (",
+                         format.needs, ")"));
+}
+
+std::string ListFormats() {
+  std::string list;
+  for (const RecordingFormat& format : RecordingFormats()) {
+    list += Concat(list.empty() ? "" : "; ", format.name, " (", format.looks_like, ")");
+  }
+  return list;
+}
+
+}  // namespace camgyro
