@@ -93,6 +93,31 @@ struct GyroInfo {
   std::optional<double> declared_rate_hz;          // as the file says, not as the stamps have it
 };
 
+// What the stamps of a stream are: readings of its sampling clock, or the times at which its
+// samples arrived somewhere, later by a latency that varies.
+enum class StampKind {
+  kMeasured,   // a steady clock, also with gaps, steps or slow drift
+  kArrival,    // a steady clock behind stamps that are late, bunched or rounded
+  kIrregular,  // neither: intervals vary, and no steady clock explains them
+};
+
+struct StampReport {
+  StampKind kind = StampKind::kMeasured;
+  double period_s = 0.0;    // of the sampling clock, in the mean
+  double jitter_s = 0.0;    // standard deviation of recorded stamps about that clock
+  double latest_s = 0.0;    // the latest stamp's distance from it
+  double residual_s = 0.0;  // how well stretches of the recording agree on the clock
+  int missing = 0;          // samples that the clock has and the stream has not
+  bool repaired = false;    // the samples' stamps are that clock now
+};
+
+// Something wrong with the data as recorded, found and (if `repaired`) mended before any fit.
+struct RecordedFault {
+  std::string name;
+  int count = 0;
+  std::string finding;  // for people, with what was done about it
+};
+
 struct Recording {
   std::string path;  // as the user gave it
   CameraGuess camera;
@@ -109,6 +134,8 @@ struct Recording {
   std::string video_file;                         // frames of a video or bag, in frames' order
 
   MatchNoise match_noise = MatchNoise::kBothImages;
+  std::optional<StampReport> gyro_stamps, camera_stamps;  // absent: nobody has looked
+  std::vector<RecordedFault> faults;
   // Set if a file says that the picture was stabilised electronically, with the file's own words.
   std::optional<std::string> declared_stabilisation;
   // What the reader saw and a user should know (unit converted, samples dropped, clock rebuilt).

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "frontend/readers/read_recording.h"
-#include "tests/frontend/recording_folder.h"
+#include "tests/frontend/readers/recording_folder.h"
 
 namespace camgyro {
 namespace {

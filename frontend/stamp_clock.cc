@@ -1,0 +1,354 @@
+#include "frontend/stamp_clock.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/robust_statistics.h"
+#include "core/time.h"
+
+namespace camgyro {
+namespace {
+
+constexpr size_t kFewestStamps = 40;
+constexpr size_t kSlopeLag = 32;      // samples; bridges bunches, mostly without a missing sample
+constexpr double kLookaheadS = 0.25;  // after which late samples have been caught up
+constexpr size_t kFewestAhead = 16;   // samples
+constexpr double kMissingPeriods = 0.6;   // rise of the envelope that is a missing sample
+constexpr double kScatterPeriods = 0.01;  // clean measured recordings: 0.003 and less
+constexpr double kScatterS = 50e-6;       // less turns no camera by a visible angle
+constexpr double kLatePeriods = 0.5;
+constexpr double kLateS = 5e-3;
+constexpr int kFewestLate = 3;            // samples
+constexpr double kWanderOfScatter = 4.0;  // a random walk over 20 s wanders by more
+constexpr double kWindowS = 20.0;
+constexpr double kBlockS = 0.25;
+constexpr size_t kFewestInBlock = 16;
+constexpr double kBreakS = 0.25;
+constexpr double kEarlyInBlock = 0.05;  // quantile of a block's stamps that stands for it
+constexpr double kEarlyBlocks = 0.2;    // quantile of blocks through which the lines go
+
+double Quantile(std::vector<double> values, double q) {
+  const auto at = values.begin() +
+                  static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+// Half the width of the middle 68 %.
+double Scatter(const std::vector<double>& values) {
+  return 0.5 * (Quantile(values, 0.84) - Quantile(values, 0.16));
+}
+
+struct Point {
+  double x = 0.0, y = 0.0;
+};
+struct Line {
+  double x0 = 0.0, y0 = 0.0, slope = 0.0;
+  double At(double x) const { return y0 + slope * (x - x0); }
+};
+
+// The line with a fraction `q` of the points below it, and the least sum of asymmetric absolute
+// distances (quantile regression). Exact: such a line goes through two of the points.
+Line QuantileLine(const std::vector<Point>& points, double q) {
+  Line best{points.front().x, points.front().y, 0.0};
+  double best_cost = std::numeric_limits<double>::infinity();
+  for (size_t a = 0; a < points.size(); ++a) {
+    for (size_t b = a + 1; b < points.size(); ++b) {
+      const Line line{points[a].x, points[a].y,
+                      (points[b].y - points[a].y) / (points[b].x - points[a].x)};
+      double cost = 0.0;
+      for (const Point& p : points) {
+        const double distance = p.y - line.At(p.x);
+        cost += distance > 0.0 ? q * distance : (q - 1.0) * distance;
+        if (cost >= best_cost) break;
+      }
+      if (cost < best_cost) {
+        best_cost = cost;
+        best = line;
+      }
+    }
+  }
+  return best;
+}
+
+// Minimum of values[i .. i + ahead], for every i.
+std::vector<double> ForwardMinimum(const std::vector<double>& values, size_t ahead) {
+  std::vector<double> minimum(values.size());
+  std::deque<size_t> candidates;
+  for (size_t i = values.size(); i-- > 0;) {
+    while (!candidates.empty() && values[candidates.back()] >= values[i]) candidates.pop_back();
+    candidates.push_back(i);
+    if (candidates.front() > i + ahead) candidates.pop_front();
+    minimum[i] = values[candidates.front()];
+  }
+  return minimum;
+}
+
+std::vector<double> BackwardMinimum(std::vector<double> values, size_t behind) {
+  std::reverse(values.begin(), values.end());
+  std::vector<double> minimum = ForwardMinimum(values, behind);
+  std::reverse(minimum.begin(), minimum.end());
+  return minimum;
+}
+
+size_t SamplesIn(double seconds, double period_s, size_t least) {
+  return std::max(least, static_cast<size_t>(std::lround(seconds / period_s)));
+}
+
+// Period from the stamps' differences over some samples, in the middle of their distribution.
+double RoughPeriod(const std::vector<double>& t) {
+  // A clean stream with many missing samples: nearly all intervals are multiples of the median.
+  std::vector<double> steps;
+  for (size_t i = 1; i < t.size(); ++i) steps.push_back(t[i] - t[i - 1]);
+  const double median = Quantile(steps, 0.5);
+  size_t multiples = 0;
+  for (const double step : steps) {
+    const double periods = std::round(step / median);
+    if (periods >= 1.0 && std::abs(step - periods * median) < 0.03 * median) ++multiples;
+  }
+  if (median > 0.0 && multiples > 0.95 * static_cast<double>(steps.size())) return median;
+  const size_t lag = std::min(kSlopeLag, t.size() / 4);
+  std::vector<double> slopes;
+  for (size_t i = lag; i < t.size(); ++i) {
+    slopes.push_back((t[i] - t[i - lag]) / static_cast<double>(lag));
+  }
+  const double rough = Quantile(std::move(slopes), 0.5);
+  const size_t longer = 8 * kSlopeLag;
+  if (!(rough > 0.0) || t.size() < 4 * longer) return rough;
+  slopes = {};  // over a longer time, with the missing samples that it shows
+  for (size_t i = longer; i < t.size(); ++i) {
+    const double periods =
+        std::max(static_cast<double>(longer), std::round((t[i] - t[i - longer]) / rough));
+    slopes.push_back((t[i] - t[i - longer]) / periods);
+  }
+  return Quantile(std::move(slopes), 0.5);
+}
+
+// Stamps without the mean clock: t - period * number.
+std::vector<double> Lateness(const std::vector<double>& t, const std::vector<int64_t>& number,
+                             double period_s) {
+  std::vector<double> late(t.size());
+  for (size_t i = 0; i < t.size(); ++i) late[i] = t[i] - period_s * static_cast<double>(number[i]);
+  return late;
+}
+
+// Numbers the samples; skips one where the envelope of the stamps to come stays above that of the
+// stamps before.
+std::vector<int64_t> NumberSamples(const std::vector<double>& t, double period_s) {
+  std::vector<int64_t> number(t.size());
+  for (size_t i = 0; i < t.size(); ++i) number[i] = static_cast<int64_t>(i);
+  const size_t ahead = SamplesIn(kLookaheadS, period_s, kFewestAhead);
+  const std::vector<double> late = Lateness(t, number, period_s);
+  const std::vector<double> to_come = ForwardMinimum(late, ahead);
+  std::vector<double> changes{0.0};  // of the envelope; the smaller ones are its noise
+  for (size_t i = ahead / 2; i < t.size(); ++i) {
+    changes.push_back(std::abs(to_come[i] - to_come[i - ahead / 2]));
+  }
+  const double noise = Quantile(std::move(changes), 0.25);  // 0.32 standard deviations
+  const double rise = std::max(kMissingPeriods * period_s, 8.0 * noise);
+
+  int64_t skipped = 0;
+  std::vector<std::pair<size_t, int64_t>> skips;  // where, how many
+  std::deque<std::pair<size_t, double>> before;   // candidates of the minimum, numbers skipped
+  for (size_t i = 0; i < t.size(); ++i) {
+    const double offset = period_s * static_cast<double>(skipped);
+    const double change = before.empty() ? 0.0 : to_come[i] - offset - before.front().second;
+    if (std::abs(change) > rise) {
+      int64_t periods = std::llround(change / period_s);
+      if (periods < 0) {  // what was taken for missing was a long latency
+        while (periods < 0 && !skips.empty()) {
+          const int64_t undone = std::min(skips.back().second, -periods);
+          for (size_t j = skips.back().first; j < i; ++j) number[j] -= undone;
+          skipped -= undone;
+          periods += undone;
+          if ((skips.back().second -= undone) == 0) skips.pop_back();
+        }
+        before.clear();
+      } else if (periods > 0) {
+        skips.emplace_back(i, periods);
+        skipped += periods;
+      }
+    }
+    number[i] += skipped;
+    const double value = late[i] - period_s * static_cast<double>(skipped);
+    while (!before.empty() && before.back().second >= value) before.pop_back();
+    before.emplace_back(i, value);
+    if (before.front().first + ahead < i) before.pop_front();
+  }
+  return number;
+}
+
+// The earliest stamps of stretches of samples, in [begin, end).
+std::vector<Point> EarliestOfBlocks(const std::vector<int64_t>& number,
+                                    const std::vector<double>& late, size_t begin, size_t end,
+                                    size_t block) {
+  std::vector<Point> points;
+  std::vector<std::pair<double, size_t>> sorted;
+  for (size_t from = begin; from < end; from += block) {
+    const size_t to = from + 2 * block > end ? end : from + block;  // no short one at the end
+    sorted.clear();
+    for (size_t i = from; i < to; ++i) sorted.emplace_back(late[i], i);
+    const auto at = sorted.begin() +
+                    static_cast<std::ptrdiff_t>(kEarlyInBlock * static_cast<double>(sorted.size()));
+    std::nth_element(sorted.begin(), at, sorted.end());
+    points.push_back({static_cast<double>(number[at->second]), at->first});
+    if (to == end) break;
+  }
+  return points;
+}
+
+// The clock of one stretch without breaks, as a correction to period * number.
+void FitClock(const std::vector<int64_t>& number, const std::vector<double>& late, double period_s,
+              size_t begin, size_t end, std::vector<double>* clock,
+              std::vector<double>* residuals) {
+  const size_t block = SamplesIn(kBlockS, period_s, kFewestInBlock);
+  const std::vector<Point> points = EarliestOfBlocks(number, late, begin, end, block);
+  const double first = static_cast<double>(number[begin]);
+  const double span = static_cast<double>(number[end - 1]) - first;
+  // Windows overlap by half; each line holds at its window's centre and fades out to the next ones.
+  const double halves = std::max(2.0, std::floor(2.0 * span * period_s / kWindowS));
+  const double half = span / halves;
+  std::vector<Line> lines;
+  for (int w = 0; w + 2 <= static_cast<int>(halves); ++w) {
+    std::vector<Point> inside;
+    for (const Point& p : points) {
+      if (p.x >= first + w * half && p.x <= first + (w + 2) * half) inside.push_back(p);
+    }
+    if (inside.size() < 4) inside = points;  // most of this window is missing
+    lines.push_back(inside.size() < 2 ? Line{points[0].x, points[0].y, 0.0}
+                                      : QuantileLine(inside, kEarlyBlocks));
+  }
+  const auto at = [&](double x) {
+    const double place =
+        std::clamp((x - first) / half - 1.0, 0.0, static_cast<double>(lines.size() - 1));
+    const size_t w = std::min(static_cast<size_t>(place), lines.size() - 1);
+    const double fade = place - static_cast<double>(w);
+    if (w + 1 == lines.size()) return lines[w].At(x);
+    return (1.0 - fade) * lines[w].At(x) + fade * lines[w + 1].At(x);
+  };
+  for (size_t i = begin; i < end; ++i) (*clock)[i] = at(static_cast<double>(number[i]));
+  for (const Point& p : points) residuals->push_back(p.y - at(p.x));
+}
+
+// Clear evidence that stamps are not the clock: see FindStampClock.
+bool IsLate(const std::vector<double>& late, double period_s, double scatter_s) {
+  if (scatter_s > std::max(kScatterPeriods * period_s, kScatterS)) return true;
+  const size_t ahead = SamplesIn(kLookaheadS, period_s, kFewestAhead);
+  const std::vector<double> after = ForwardMinimum(late, ahead);
+  const std::vector<double> before = BackwardMinimum(late, ahead);
+  int count = 0;
+  for (size_t i = 0; i < late.size(); ++i) {
+    const double behind = late[i] - std::max(before[i], after[i]);
+    count += behind > std::min(kLatePeriods * period_s, kLateS) ? 1 : 0;
+  }
+  return count >= kFewestLate;
+}
+
+}  // namespace
+
+StampClock FindStampClock(const std::vector<int64_t>& stamps_ns) {
+  StampClock found;
+  StampReport& report = found.report;
+  const size_t n = stamps_ns.size();
+  if (n < 2) return found;
+  std::vector<double> t(n);
+  for (size_t i = 0; i < n; ++i) t[i] = SecondsSince(stamps_ns.front(), stamps_ns[i]);
+  report.period_s = t.back() / static_cast<double>(n - 1);
+  if (n < kFewestStamps) return found;
+  double period_s = RoughPeriod(t);
+  if (!(period_s > 0.0)) return found;
+
+  std::vector<int64_t> number = NumberSamples(t, period_s);
+  for (int round = 0; round < 2; ++round) {  // with a better period, better numbers
+    const std::vector<Point> points = EarliestOfBlocks(number, Lateness(t, number, period_s), 0, n,
+                                                       std::max(kFewestInBlock, n / 80));
+    if (points.size() < 2) break;
+    const double better_s = period_s + QuantileLine(points, kEarlyBlocks).slope;
+    if (!(better_s > 0.5 * period_s && better_s < 2.0 * period_s)) break;
+    period_s = better_s;
+    number = NumberSamples(t, period_s);
+  }
+  const std::vector<double> late = Lateness(t, number, period_s);
+  report.period_s = period_s;
+  report.missing = static_cast<int>(number.back() + 1 - static_cast<int64_t>(n));
+
+  std::vector<double> changes;
+  for (size_t i = 1; i < n; ++i) changes.push_back(late[i] - late[i - 1]);
+  const double scatter_s = Scatter(changes) / std::sqrt(2.0);
+  report.jitter_s = scatter_s;
+  if (!IsLate(late, period_s, scatter_s)) return found;
+
+  std::vector<double> clock(n, 0.0), residuals;
+  size_t begin = 0;
+  for (size_t i = 1; i <= n; ++i) {
+    if (i < n && static_cast<double>(number[i] - number[i - 1]) * period_s < kBreakS) continue;
+    FitClock(number, late, period_s, begin, i, &clock, &residuals);
+    begin = i;
+  }
+  double sum = 0.0, sum_squares = 0.0, changes_squares = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    const double distance = late[i] - clock[i];
+    sum += distance;
+    sum_squares += distance * distance;
+    report.latest_s = std::max(report.latest_s, distance);
+    if (i > 0) changes_squares += changes[i - 1] * changes[i - 1];
+  }
+  const double count = static_cast<double>(n);
+  report.jitter_s = std::sqrt(std::max(0.0, sum_squares / count - sum * sum / (count * count)));
+  report.residual_s = Scatter(residuals);
+  report.kind = report.jitter_s > kWanderOfScatter * std::sqrt(changes_squares / count)
+                    ? StampKind::kIrregular
+                    : StampKind::kArrival;
+  if (report.kind != StampKind::kArrival) return found;
+  found.sampled_ns.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    const double sampled_s = period_s * static_cast<double>(number[i]) + clock[i];
+    found.sampled_ns[i] = StampAt(stamps_ns.front(), sampled_s);
+    if (i > 0 && found.sampled_ns[i] <= found.sampled_ns[i - 1]) {  // clocks of two stretches
+      found.sampled_ns[i] = found.sampled_ns[i - 1] + 1;
+    }
+  }
+  return found;
+}
+
+double InterpolationError(const std::vector<GyroSample>& samples,
+                          const std::vector<int64_t>& stamps_ns) {
+  std::vector<double> errors;
+  for (size_t i = 1; i + 1 < samples.size(); ++i) {
+    const double before = SecondsSince(stamps_ns[i - 1], stamps_ns[i]);
+    const double both = SecondsSince(stamps_ns[i - 1], stamps_ns[i + 1]);
+    if (!(both > 0.0)) continue;
+    const double part = before / both;
+    errors.push_back((samples[i].omega_gyro_rad_s - (1.0 - part) * samples[i - 1].omega_gyro_rad_s -
+                      part * samples[i + 1].omega_gyro_rad_s)
+                         .squaredNorm());
+  }
+  return errors.empty() ? 0.0 : MedianInPlace(&errors);
+}
+
+std::string DescribeStamps(const StampReport& report) {
+  char text[200];
+  const double period_ms = 1e3 * report.period_s, jitter_ms = 1e3 * report.jitter_s;
+  switch (report.kind) {
+    case StampKind::kMeasured:
+      std::snprintf(text, sizeof text, "a steady clock of %.6g ms, jitter %.2g ms", period_ms,
+                    jitter_ms);
+      break;
+    case StampKind::kArrival:
+      std::snprintf(text, sizeof text,
+                    "arrival times: up to %.2g ms late; %s a clock of %.6g ms, residual %.2g ms",
+                    1e3 * report.latest_s, report.repaired ? "laid on" : "behind them is",
+                    period_ms, 1e3 * report.residual_s);
+      break;
+    case StampKind::kIrregular:
+      std::snprintf(text, sizeof text,
+                    "irregular: no steady clock explains intervals of %.6g ms in the mean; left "
+                    "as recorded",
+                    period_ms);
+      break;
+  }
+  return text;
+}
+
+}  // namespace camgyro
