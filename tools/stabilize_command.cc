@@ -10,6 +10,7 @@
 #include "frontend/readers/read_recording.h"
 #include "pipeline/read_calibration.h"
 #include "tools/commands.h"
+#include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/stabilization/stabilize.h"
 #include "tools/summary.h"
