@@ -100,9 +100,14 @@ std::pair<double, double> PairGraph::Exposures(const FrameTime& frame_a,
 void PairGraph::AddRate(const TimedRate& rate) {
   if (!samples_.empty()) CHECK_GT(rate.time_s, samples_.back().time_s);
   samples_.push_back(rate);
-  if (samples_.size() == 50 || (samples_.size() < 50 && samples_.size() >= 3)) {
+  // Estimated until the first group of rates is made: its size, and those of the groups that pairs
+  // share with it, follow from it.
+  if (next_group_ == 0 && samples_.size() >= 3 && samples_.size() <= 50) {
     std::vector<double> intervals = Intervals(samples_);
-    median_interval_s_ = MedianInPlace(&intervals);
+    // Stamps of samples that arrive in bunches have a median near zero.
+    const double mean_s =
+        (samples_.back().time_s - samples_.front().time_s) / static_cast<double>(intervals.size());
+    median_interval_s_ = std::max(MedianInPlace(&intervals), mean_s);
   }
 }
 

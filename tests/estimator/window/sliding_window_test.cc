@@ -74,6 +74,24 @@ TEST(SlidingWindow, FindsTheTruthOfAFarSceneByTransfers) {
   EXPECT_LT(error.cwiseAbs().maxCoeff(), 4.5) << error.transpose();
 }
 
+// Stamps at which samples arrive, in bunches after a late start: the interval of the first samples
+// is no guess that pairs could share rates by.
+TEST(SlidingWindow, TakesSamplesThatArriveInBunches) {
+  Simulated s = SimulateTracks(ShortScenario(2.5)).value();
+  std::vector<GyroSample>& gyro = s.recording.gyro;
+  const auto bunch = [](size_t i) { return i < 12 ? size_t{1} : 1 + (i / 20) % 6; };
+  for (size_t i = 0; i < gyro.size();) {
+    const size_t end = std::min(gyro.size(), i + bunch(i));
+    const int64_t arrival = gyro[end - 1].stamp_ns;
+    for (const size_t last = end; i < last; ++i) {
+      gyro[i].stamp_ns = arrival - static_cast<int64_t>(last - 1 - i) * 200000;  // 0.2 ms apart
+    }
+  }
+  SlidingWindow window = MakeWindow(s);
+  FeedAll(s.recording, &window);
+  EXPECT_GT(window.num_used_pairs(), 60);
+}
+
 TEST(SlidingWindow, TwoRunsAreBitIdenticalAndMemoryIsBounded) {
   const Simulated s = SimulateTracks(ShortScenario(7.0)).value();
   // Settles early, so that the test is quick.
