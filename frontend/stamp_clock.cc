@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <limits>
+#include <utility>
 
+#include "core/format.h"
 #include "core/robust_statistics.h"
 #include "core/time.h"
 
@@ -247,7 +249,7 @@ bool IsLate(const std::vector<double>& late, double period_s, double scatter_s) 
 
 }  // namespace
 
-StampClock FindStampClock(const std::vector<int64_t>& stamps_ns) {
+StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_clean) {
   StampClock found;
   StampReport& report = found.report;
   const size_t n = stamps_ns.size();
@@ -277,7 +279,8 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns) {
   for (size_t i = 1; i < n; ++i) changes.push_back(late[i] - late[i - 1]);
   const double scatter_s = Scatter(changes) / std::sqrt(2.0);
   report.jitter_s = scatter_s;
-  if (!IsLate(late, period_s, scatter_s)) return found;
+  const bool is_late = IsLate(late, period_s, scatter_s);
+  if (!is_late && !even_if_clean) return found;
 
   std::vector<double> clock(n, 0.0), residuals;
   size_t begin = 0;
@@ -297,10 +300,12 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns) {
   const double count = static_cast<double>(n);
   report.jitter_s = std::sqrt(std::max(0.0, sum_squares / count - sum * sum / (count * count)));
   report.residual_s = Scatter(residuals);
-  report.kind = report.jitter_s > kWanderOfScatter * std::sqrt(changes_squares / count)
-                    ? StampKind::kIrregular
-                    : StampKind::kArrival;
-  if (report.kind != StampKind::kArrival) return found;
+  if (is_late) {
+    report.kind = report.jitter_s > kWanderOfScatter * std::sqrt(changes_squares / count)
+                      ? StampKind::kIrregular
+                      : StampKind::kArrival;
+  }
+  if (report.kind == StampKind::kIrregular) return found;
   found.sampled_ns.resize(n);
   for (size_t i = 0; i < n; ++i) {
     const double sampled_s = period_s * static_cast<double>(number[i]) + clock[i];
@@ -328,27 +333,21 @@ double InterpolationError(const std::vector<GyroSample>& samples,
 }
 
 std::string DescribeStamps(const StampReport& report) {
-  char text[200];
-  const double period_ms = 1e3 * report.period_s, jitter_ms = 1e3 * report.jitter_s;
+  const double period_ms = 1e3 * report.period_s;
   switch (report.kind) {
     case StampKind::kMeasured:
-      std::snprintf(text, sizeof text, "a steady clock of %.6g ms, jitter %.2g ms", period_ms,
-                    jitter_ms);
-      break;
+      return Format("a steady clock's, %.6g ms, jitter %.2g ms", period_ms, 1e3 * report.jitter_s);
     case StampKind::kArrival:
-      std::snprintf(text, sizeof text,
-                    "arrival times: up to %.2g ms late; %s a clock of %.6g ms, residual %.2g ms",
+      return Format("arrival times: up to %.2g ms late; %s a clock of %.6g ms, residual %.2g ms",
                     1e3 * report.latest_s, report.repaired ? "laid on" : "behind them is",
                     period_ms, 1e3 * report.residual_s);
-      break;
     case StampKind::kIrregular:
-      std::snprintf(text, sizeof text,
-                    "irregular: no steady clock explains intervals of %.6g ms in the mean; left "
-                    "as recorded",
-                    period_ms);
-      break;
+      return Format(
+          "irregular: no steady clock explains intervals of %.6g ms in the mean; left as "
+          "recorded",
+          period_ms);
   }
-  return text;
+  return "";
 }
 
 }  // namespace camgyro

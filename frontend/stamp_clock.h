@@ -21,7 +21,7 @@ namespace camgyro {
 struct StampClock {
   StampReport report;
   std::vector<int64_t> sampled_ns;  // times of the samples by the clock, strictly increasing;
-                                    // empty unless the kind is kArrival
+                                    // empty where stamps are to be left as they are
 };
 
 // Finds the clock. `stamps_ns`: in the order of the samples, not decreasing (several may be equal).
@@ -37,7 +37,8 @@ struct StampClock {
 //     faded into each other; it starts anew after gaps of more than 0.25 s.
 //
 // Clean stamps, also those with drift, steps and gaps, are kMeasured: leave them as they are.
-StampClock FindStampClock(const std::vector<int64_t>& stamps_ns);
+// With `even_if_clean`, sampled_ns is filled for clean stamps too, if there are enough.
+StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_clean = false);
 
 // How badly each sample's rate is foretold by linear interpolation between its neighbours: median
 // squared error [rad^2/s^2] with these stamps. The better stamps foretell better.

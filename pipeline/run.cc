@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/diagnosis/data_faults.h"
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "frontend/camera_rotations.h"
 
@@ -10,13 +11,17 @@ namespace camgyro {
 
 Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* recording) {
   if (recording->HasOnlyAttitudes()) return TrackingSummary{};
+  Result<TrackingSummary> summary = TrackingSummary{};
   if (recording->tracks.empty() && recording->matches.empty()) {
     TrackingProgress tracking;
     if (progress) tracking = [&](double done) { progress("tracking", done); };
-    return TrackRecording({}, nullptr, tracking, recording);
+    summary = TrackRecording({}, nullptr, tracking, recording);
+    if (!summary) return summary;
+  } else if (Status enough = CheckImageMotion(*recording); !enough) {
+    return tl::unexpected(enough.error());
   }
-  if (Status enough = CheckImageMotion(*recording); !enough) return tl::unexpected(enough.error());
-  return TrackingSummary{};
+  DropRepeatedPictures(recording);
+  return summary;
 }
 
 CameraRotationsAtFocal RotationsFrom(const Recording& recording, size_t max_pairs) {

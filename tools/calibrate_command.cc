@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "pipeline/input_yaml.h"
 #include "pipeline/result_files.h"
 #include "pipeline/run.h"
 #include "tools/commands.h"
@@ -11,6 +12,7 @@
 #include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/report/calibrate_report.h"
+#include "tools/required.h"
 #include "tools/summary.h"
 
 DEFINE_string(out, "",
@@ -43,6 +45,7 @@ Result<CalibrateOptions> OptionsFromFlags() {
     return BadUsage("--effects=" + FLAGS_effects + ": expected none with --residual=transfer");
   }
   if (!(FLAGS_search_s > 0.0)) return BadUsage("--search_s: expected a positive number");
+  if (Status known = CheckRequireFlag(); !known) return tl::unexpected(known.error());
   options.start.search_s = FLAGS_search_s;
   options.refine = FLAGS_refine;
   options.effects = FLAGS_effects;
@@ -63,6 +66,7 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   }
 
   Result<CalibrationRun> run = CannotEstimate("");
+  const size_t shown = recording->notes.size();
   {
     ProgressBar bar;
     run = RunCalibration(
@@ -70,13 +74,14 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
         [&](const std::string& stage, double done) { bar.Show(stage, done); }, &*recording);
   }
   if (!run) return tl::unexpected(run.error());
+  if (Status strict = CheckStrict(*recording); !strict) return strict;
   const CalibrationReport* report = &run->report;
   const TrackingSummary* tracking = &run->tracking;
 
   const bool attitudes = recording->HasOnlyAttitudes();
   files.Add("trace.csv", TraceCsv(report->trace));
   files.Add("delay.csv", DelayCsv(report->start.curve));
-  const std::string yaml = CalibrationYaml(*report, attitudes);
+  const std::string yaml = CalibrationYaml(*report, attitudes) + InputYaml(*recording);
   files.Add("calibration.yaml", yaml);
   const Command command = CalibrateCommand();
   const Result<std::string> html =
@@ -89,14 +94,17 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
 
   std::printf("\n%s", ParameterTable(report->calibration, attitudes).c_str());
   if (!FLAGS_quiet) {
-    std::printf("\n%s%s%s%s%s%s", MotionLine(*recording, *tracking).c_str(),
-                StartLine(report->start).c_str(), QualityLine(*report, attitudes).c_str(),
+    const std::vector<std::string> found(recording->notes.begin() + static_cast<long>(shown),
+                                         recording->notes.end());
+    std::printf("\n%s%s%s%s%s%s%s", Notes("input", found).c_str(),
+                MotionLine(*recording, *tracking).c_str(), StartLine(report->start).c_str(),
+                QualityLine(*report, attitudes).c_str(),
                 TimeLine(*report, tracking->seconds, recording->frames.size()).c_str(),
                 Notes("note", report->notes).c_str(), Notes("doubt", report->doubts).c_str());
     std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv\n",
                 files.folder().c_str());
   }
-  return {};
+  return CheckDetermined(report->calibration);
 }
 
 }  // namespace
@@ -111,8 +119,8 @@ Command CalibrateCommand() {
   command.flags = {"out", "effects"};
   for (const std::string& name : FitFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"estimator", "refine"});
-  for (const std::string& name : GuessFlags()) command.flags.push_back(name);
-  command.flags.insert(command.flags.end(), {"search_s", "quiet"});
+  for (const std::string& name : InputFlags()) command.flags.push_back(name);
+  command.flags.insert(command.flags.end(), {"require", "search_s", "quiet"});
   command.run = RunCalibrate;
   return command;
 }

@@ -137,6 +137,7 @@ Status RunDelay(const std::vector<std::string>& arguments) {
     const Result<TrackingSummary> tracking = EnsureImageMotion(
         [&](const std::string& stage, double done) { bar.Show(stage, done); }, &*recording);
     if (!tracking) return tl::unexpected(tracking.error());
+    if (Status strict = CheckStrict(*recording); !strict) return strict;
     report = FindDelay(*recording, &bar);
   }
   if (!report) return tl::unexpected(Refusal(*recording, report.error()));
@@ -180,7 +181,7 @@ Command DelayCommand() {
       "delay between camera and gyro, by rotations alone: with its curve (--out: delay.csv, and "
       "delay_slerp.csv of the windowed search)";
   command.flags = {"out", "search_s"};
-  for (const std::string& name : GuessFlags()) command.flags.push_back(name);
+  for (const std::string& name : InputFlags()) command.flags.push_back(name);
   command.flags.push_back("quiet");
   command.run = RunDelay;
   return command;

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "pipeline/input_yaml.h"
 #include "pipeline/result_files.h"
 #include "pipeline/run.h"
 #include "tools/commands.h"
@@ -10,6 +11,7 @@
 #include "tools/diagnosis_report.h"
 #include "tools/progress_bar.h"
 #include "tools/recording_input.h"
+#include "tools/required.h"
 #include "tools/summary.h"
 
 DECLARE_string(out);
@@ -25,6 +27,7 @@ namespace {
 Status RunDiagnose(const std::vector<std::string>& arguments) {
   DiagnoseOptions options;
   if (!(FLAGS_search_s > 0.0)) return BadUsage("--search_s: expected a positive number");
+  if (Status known = CheckRequireFlag(); !known) return known;
   if (!(FLAGS_significance > 0.0 && FLAGS_significance < 1.0)) {
     return BadUsage("--significance: expected a number between 0 and 1");
   }
@@ -47,11 +50,12 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
         &*recording);
   }
   if (!run) return tl::unexpected(run.error());
+  if (Status strict = CheckStrict(*recording); !strict) return strict;
   const Diagnosis& diagnosis = run->diagnosis;
   const bool attitudes = recording->HasOnlyAttitudes();
   files.Add("diagnosis.yaml", DiagnosisYaml(diagnosis));
   if (diagnosis.before) {
-    const std::string yaml = CalibrationYaml(diagnosis.result(), attitudes);
+    const std::string yaml = CalibrationYaml(diagnosis.result(), attitudes) + InputYaml(*recording);
     files.Add("calibration.yaml", yaml);
     const Command command = DiagnoseCommand();
     const Result<std::string> html =
@@ -83,6 +87,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   }
   if (diagnosis.refusal) return tl::unexpected(Refusal(*recording, *diagnosis.refusal));
   if (!diagnosis.not_tested.empty()) return CannotEstimate("diagnosis: " + diagnosis.not_tested);
+  if (diagnosis.before) return CheckDetermined(diagnosis.result().calibration);
   return {};
 }
 
@@ -97,8 +102,8 @@ Command DiagnoseCommand() {
       "effect, adds it, and reports the error before and after, into diagnosis.yaml (and "
       "calibration.yaml with the effects, calibration_before.yaml without)";
   command.flags = {"out", "significance"};
-  for (const std::string& name : GuessFlags()) command.flags.push_back(name);
-  command.flags.insert(command.flags.end(), {"search_s", "quiet"});
+  for (const std::string& name : InputFlags()) command.flags.push_back(name);
+  command.flags.insert(command.flags.end(), {"require", "search_s", "quiet"});
   command.run = RunDiagnose;
   return command;
 }

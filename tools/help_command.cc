@@ -50,7 +50,7 @@ std::string ProgramHelp() {
   }
   help +=
       "\n`camgyro help COMMAND` lists its flags. Exit codes: 0 done; 2 bad usage; 3 bad input;\n"
-      "4 could not estimate.\n";
+      "4 could not estimate, or nothing (or not what --require names) was determined.\n";
   return help;
 }
 

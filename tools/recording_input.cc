@@ -15,21 +15,47 @@ DEFINE_double(
 DEFINE_double(delay_ms, 0.0,
               "centre of the delay search, gyro clock minus camera stamp; default: sensor.yaml's, "
               "else 0");
+DEFINE_string(stamps, "auto",
+              "gyro stamps: recorded, repaired (laid on the sampling clock behind them), or auto: "
+              "repaired where they are clearly times of arrival");
+DEFINE_bool(strict, false, "refuse recordings whose data have to be repaired");
 
 namespace camgyro {
-std::vector<std::string> GuessFlags() { return {"focal_px", "readout_ms", "delay_ms"}; }
+std::vector<std::string> InputFlags() {
+  return {"focal_px", "readout_ms", "delay_ms", "stamps", "strict"};
+}
+
+Result<ReadOptions> ReadOptionsFromFlags() {
+  ReadOptions options;
+  options.strict = FLAGS_strict;
+  if (FLAGS_stamps == "recorded") {
+    options.stamps = StampsMode::kRecorded;
+  } else if (FLAGS_stamps == "repaired") {
+    options.stamps = StampsMode::kRepaired;
+  } else if (FLAGS_stamps != "auto") {
+    return BadUsage("--stamps=" + FLAGS_stamps + ": expected auto, recorded or repaired");
+  }
+  return options;
+}
 
 Result<Recording> OpenRecording(const std::string& path) {
   if (FlagGiven("focal_px") && !(FLAGS_focal_px > 0.0)) {
     return BadUsage("--focal_px: expected a positive number");
   }
-  Result<Recording> recording = ReadRecording(path);
+  const Result<ReadOptions> options = ReadOptionsFromFlags();
+  if (!options) return tl::unexpected(options.error());
+  Result<Recording> recording = ReadRecording(path, *options);
   if (!recording) return recording;
   CameraGuess& guess = recording->camera;
   if (FlagGiven("focal_px")) guess.focal_px = FLAGS_focal_px;
   if (FlagGiven("readout_ms")) guess.readout_s = 1e-3 * FLAGS_readout_ms;
   if (FlagGiven("delay_ms")) guess.delay_s = 1e-3 * FLAGS_delay_ms;
   return recording;
+}
+
+Status CheckStrict(const Recording& recording) {
+  if (!FLAGS_strict || recording.faults.empty()) return {};
+  return BadInput(recording.path + ": with --strict: " + recording.faults.back().finding);
 }
 
 std::string DescribeRecording(const Recording& recording) {

@@ -103,7 +103,9 @@ Status RunStabilize(const std::vector<std::string>& arguments) {
   }
   const Result<Calibration> calibration = ReadCalibration(FLAGS_calibration);
   if (!calibration) return tl::unexpected(calibration.error());
-  const Result<Recording> recording = ReadRecording(arguments[0]);
+  const Result<ReadOptions> reading = ReadOptionsFromFlags();
+  if (!reading) return tl::unexpected(reading.error());
+  const Result<Recording> recording = ReadRecording(arguments[0], *reading);
   if (!recording) return tl::unexpected(recording.error());
   std::error_code error;
   if (fs::exists(out, error) && !recording->video_file.empty() &&
@@ -148,8 +150,8 @@ Command StabilizeCommand() {
   command.summary =
       "rectified, stabilised video: the rolling shutter undone and the view smoothed with a "
       "calibration.yaml; says how much better neighbouring frames lie on each other";
-  command.flags = {"calibration", "out",          "smooth_s", "zoom",
-                   "border",      "side_by_side", "crf",      "quiet"};
+  command.flags = {"calibration",  "out", "smooth_s", "zoom",   "border",
+                   "side_by_side", "crf", "stamps",   "strict", "quiet"};
   command.run = RunStabilize;
   return command;
 }

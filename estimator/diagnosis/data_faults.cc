@@ -43,21 +43,23 @@ double PairMotion(const FramePair& pair) {
   return motion.empty() ? 0.0 : MedianInPlace(&motion);
 }
 
-// Neighbouring frames that show the same picture while those around them move.
-int CountDuplicates(const Recording& recording) {
-  const std::vector<FramePair> pairs =
+// Frames that show the picture of the frame before, while the camera moves before and after.
+std::vector<int> RepeatedPictures(const Recording& recording) {
+  std::vector<FramePair> pairs =
       recording.matches.empty() ? PairsFromTracks(recording.tracks, 1) : recording.matches;
+  const auto apart = [](const FramePair& pair) { return pair.frame_b != pair.frame_a + 1; };
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), apart), pairs.end());
   std::vector<double> motion;
   for (const FramePair& pair : pairs) motion.push_back(PairMotion(pair));
-  int duplicates = 0;
+  std::vector<int> repeated;
   for (size_t i = 1; i + 1 < motion.size(); ++i) {
     const bool around = std::min(motion[i - 1], motion[i + 1]) > 1.0;
     if (around && pairs[i].matches.size() >= 8 &&
         motion[i] < 0.02 * std::min(motion[i - 1], motion[i + 1])) {
-      ++duplicates;
+      repeated.push_back(pairs[i].frame_b);
     }
   }
-  return duplicates;
+  return repeated;
 }
 
 // Power of rates in a band, by differences of moving averages; rates and the times between them.
@@ -95,7 +97,7 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
     faults.push_back({"gyro_saturation",
                       Format("%ld of %zu gyro samples stay at the rail of %.3f rad/s (%.0f deg/s)",
                              static_cast<long>(count), saturated.size(), rail, rail * 57.29578),
-                      FindEffect("gyro_saturation")->advice});
+                      FindEffect("gyro_saturation")->advice, static_cast<int>(count)});
   }
   const Gaps frames = FindGaps(recording.frames, origin_ns);
   if (frames.count > 0) {
@@ -104,21 +106,22 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
          Format("%d gaps in the frames' stamps (about %d frames missing), the longest "
                 "of %.0f ms at %.2f s",
                 frames.count, frames.missing, 1e3 * frames.longest_s, frames.longest_at_s),
-         "harmless if the stamps are right: check for a delay_step at these times"});
+         "harmless if the stamps are right: check for a delay_step at these times", frames.count});
   }
   const Gaps samples = FindGaps(recording.gyro, origin_ns);
   if (samples.longest_s > std::max(0.03, 5.0 * MedianInterval(recording.gyro))) {
     faults.push_back({"dropped_samples",
                       Format("%d gaps in the gyro's stamps, the longest of %.0f ms at %.2f s",
                              samples.count, 1e3 * samples.longest_s, samples.longest_at_s),
-                      "pairs of frames in such gaps are left out; give the logger more time"});
+                      "pairs of frames in such gaps are left out; give the logger more time",
+                      samples.count});
   }
-  const int duplicates = CountDuplicates(recording);
+  const int duplicates = static_cast<int>(RepeatedPictures(recording).size());
   if (duplicates > 0) {
     faults.push_back(
         {"duplicated_frames",
          Format("%d frames repeat the picture before them while the camera moves", duplicates),
-         "drop them: their stamps belong to another picture"});
+         "drop them: their stamps belong to another picture", duplicates});
   }
   const double interval = MedianInterval(recording.gyro);
   if (recording.gyro_info.declared_rate_hz && interval > 0.0 &&
@@ -129,6 +132,42 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
                       "trust the stamps, or find out which of the two is wrong"});
   }
   return faults;
+}
+
+int DropRepeatedPictures(Recording* recording) {
+  const std::vector<int> repeated = RepeatedPictures(*recording);
+  if (repeated.empty() || 2 * repeated.size() > recording->frames.size()) return 0;
+  std::vector<int> moved(recording->frames.size());  // new index; of a repeat, its original's
+  size_t kept = 0, next = 0;
+  for (size_t i = 0; i < moved.size(); ++i) {
+    if (next < repeated.size() && repeated[next] == static_cast<int>(i)) {
+      ++next;
+      moved[i] = static_cast<int>(kept) - 1;
+      continue;
+    }
+    moved[i] = static_cast<int>(kept);
+    recording->frames[kept] = recording->frames[i];
+    if (!recording->tracks.empty()) recording->tracks[kept].swap(recording->tracks[i]);
+    if (!recording->q_cam_world.empty()) recording->q_cam_world[kept] = recording->q_cam_world[i];
+    ++kept;
+  }
+  recording->frames.resize(kept);
+  if (!recording->tracks.empty()) recording->tracks.resize(kept);
+  if (!recording->q_cam_world.empty()) recording->q_cam_world.resize(kept);
+  std::vector<FramePair> pairs;
+  for (FramePair& pair : recording->matches) {
+    pair.frame_a = moved[static_cast<size_t>(pair.frame_a)];
+    pair.frame_b = moved[static_cast<size_t>(pair.frame_b)];
+    if (pair.frame_a < pair.frame_b) pairs.push_back(std::move(pair));
+  }
+  recording->matches = std::move(pairs);
+  recording->video_file.clear();
+  const int count = static_cast<int>(repeated.size());
+  const std::string finding =
+      Format("%d frames repeat the picture before them while the camera moves; left out", count);
+  recording->faults.push_back({"duplicated_frames", count, finding});
+  recording->notes.push_back(finding);
+  return count;
 }
 
 std::optional<std::string> FindElectronicStabilisation(

@@ -17,11 +17,18 @@ struct DataFault {
   std::string name;
   std::string finding;
   std::string advice;
+  int count = 1;  // of samples, frames, gaps, or of the fault itself
 };
 
 // Samples at the full scale, dropped and duplicated frames, dropped samples, a rate of samples that
 // is not what the file declares.
 std::vector<DataFault> FindDataFaults(const Recording& recording);
+
+// Leaves out frames that repeat the picture before them while the camera moves: their stamps belong
+// to another picture. For tracks without identity across such a frame nothing is lost. Records the
+// fault and returns how many; a recording with repeats in more than half of the places stays as it
+// is. After it, frames do not number the pictures of video_file any more, which is therefore unset.
+int DropRepeatedPictures(Recording* recording);
 
 // Is the picture without the fast rotation that the gyro has? Compares the power of the rates below
 // 0.5 Hz and above 1 Hz, which needs neither delay nor mounting. `rotations`: of the camera, some

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "frontend/readers/csv_reader.h"
+#include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
 
 namespace camgyro {
@@ -178,12 +179,18 @@ Status ReadAttitudes(const std::string& file, Recording* recording) {
   const std::vector<Frame>& frames = recording->frames;
   std::vector<bool> seen(frames.size(), false);
   std::vector<Eigen::Quaterniond> q_cam_world(frames.size(), Eigen::Quaterniond::Identity());
+  int repeated = 0;
   while (csv.NextRow()) {
     const int frame = index.Find(csv.Stamp(0), &csv);
     const Eigen::Quaterniond q(csv.Number(1), csv.Number(2), csv.Number(3), csv.Number(4));
     if (!csv.status()) return csv.status();
+    if (seen[frame] && q.normalized().coeffs() == q_cam_world[frame].coeffs()) {
+      ++repeated;
+      continue;
+    }
     if (seen[frame]) {
-      csv.Fail(Concat("timestamp ", frames[frame].stamp_ns, " repeats, expected it once"));
+      csv.Fail(Concat("timestamp ", frames[frame].stamp_ns,
+                      " repeats with another attitude, expected it once"));
     }
     if (std::abs(q.norm() - 1.0) > 1e-3) {
       csv.Fail(Concat("the quaternion's norm is ", q.norm(), ", expected 1 within 0.001"));
@@ -197,6 +204,10 @@ Status ReadAttitudes(const std::string& file, Recording* recording) {
     return BadInput(Concat(file, ": the frame of timestamp ",
                            frames[missing - seen.begin()].stamp_ns,
                            " has no attitude, expected one row for every frame"));
+  }
+  if (repeated > 0) {
+    AddFault("attitudes_repeat", repeated,
+             Concat(file, ": ", repeated, " rows that repeat an attitude were dropped"), recording);
   }
   recording->q_cam_world = std::move(q_cam_world);
   return {};

@@ -42,6 +42,7 @@ class CsvReader {
   size_t NextWidth();  // cells of the row that NextRow() will find; 0 at the end
   size_t width() const { return cells_.size(); }
   int line() const { return line_; }  // of the current row, from 1
+  std::string Place() const { return file_ + ":" + std::to_string(line_); }
 
   std::string_view Cell(size_t column) const { return cells_[column]; }
   int64_t Stamp(size_t column) { return Integer(column, "an integer number of nanoseconds"); }

@@ -71,7 +71,8 @@ Status AddFramesOfTables(const CameraFiles& files, Recording* recording) {
 // A note if sensor.yaml declares another rate than the stamps have, by more than a tenth.
 void NoteRate(const fs::path& part, std::optional<double> declared_hz, double interval_s,
               Recording* recording) {
-  if (!declared_hz || std::abs(*declared_hz * interval_s - 1.0) < 0.1) return;
+  if (!declared_hz || !(interval_s > 0.0) || std::abs(*declared_hz * interval_s - 1.0) < 0.1)
+    return;
   recording->notes.push_back(Concat((part / "sensor.yaml").string(), ": says rate_hz ",
                                     *declared_hz, ", but the stamps of ", part.filename().string(),
                                     " give ", 1.0 / interval_s, " Hz"));

@@ -5,10 +5,12 @@
 #include "frontend/readers/folder_reader.h"
 #include "frontend/readers/formats.h"
 #include "frontend/readers/text.h"
+#include "frontend/stamp_clock.h"
 
 namespace camgyro {
+namespace {
 
-Result<Recording> ReadRecording(const std::string& path) {
+Result<Recording> ReadAsRecorded(const std::string& path) {
   namespace fs = std::filesystem;
   try {
     if (!fs::exists(path)) {
@@ -24,6 +26,23 @@ Result<Recording> ReadRecording(const std::string& path) {
   } catch (const fs::filesystem_error& error) {  // of folders that may not be read
     return BadInput(Concat(path, ": ", error.code().message()));
   }
+}
+
+}  // namespace
+
+Result<Recording> ReadRecording(const std::string& path, const ReadOptions& options) {
+  Result<Recording> recording = ReadAsRecorded(path);
+  if (!recording) return recording;
+  RepairStamps(options.stamps, &*recording);
+  if (options.strict && !recording->faults.empty()) {
+    return BadInput("with strict reading: " + recording->faults.front().finding);
+  }
+  if (options.strict && recording->gyro_stamps->repaired) {
+    return BadInput(Concat(path, ": with strict reading: gyro stamps are ",
+                           DescribeStamps(*recording->gyro_stamps),
+                           "; read stamps as recorded to use them so"));
+  }
+  return recording;
 }
 
 }  // namespace camgyro

@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
+#include "core/robust_statistics.h"
+#include "core/time.h"
 #include "frontend/readers/text.h"
+#include "frontend/stamp_clock.h"
 
 namespace camgyro {
 namespace {
@@ -12,23 +16,128 @@ constexpr double kGyroFullScaleRadS = 2000.0 * M_PI / 180.0;  // of most MEMS gy
 constexpr double kFastestGyroHz = 100e3;
 constexpr double kFastestCameraHz = 100e3;
 
+// Indices of the longest sequence of samples whose stamps do not decrease (patience sorting). From
+// the end, so that of two samples that exclude each other the earlier stays.
+std::vector<size_t> LongestNonDecreasing(const std::vector<GyroSample>& samples) {
+  std::vector<size_t> heads, after(samples.size());  // first of the best sequence of each length
+  for (size_t i = samples.size(); i-- > 0;) {
+    const auto place = std::upper_bound(
+        heads.begin(), heads.end(), samples[i].stamp_ns,
+        [&](int64_t stamp_ns, size_t head) { return stamp_ns > samples[head].stamp_ns; });
+    after[i] = place == heads.begin() ? i : *std::prev(place);
+    if (place == heads.end()) {
+      heads.push_back(i);
+    } else {
+      *place = i;
+    }
+  }
+  std::vector<size_t> sequence;
+  for (size_t at = heads.back(); sequence.size() < heads.size(); at = after[at]) {
+    sequence.push_back(at);
+  }
+  return sequence;
+}
+
+// Two sensors whose samples take turns: neighbours differ by the sensors' biases and axes, samples
+// two rows apart by the motion only. Of one sensor, samples farther apart differ more.
+bool SamplesTakeTurns(const std::vector<GyroSample>& samples) {
+  constexpr size_t kFewest = 100;
+  constexpr double kRatio = 3.0;
+  if (samples.size() < kFewest) return false;
+  const auto median_change = [&](size_t apart) {
+    std::vector<double> changes;
+    for (size_t i = apart; i < samples.size(); ++i) {
+      changes.push_back((samples[i].omega_gyro_rad_s - samples[i - apart].omega_gyro_rad_s).norm());
+    }
+    return MedianInPlace(&changes);
+  };
+  return median_change(1) > kRatio * median_change(2);
+}
+
 }  // namespace
 
-std::optional<std::string> GyroCollector::Add(const GyroSample& sample,
-                                              const std::optional<Eigen::Vector3d>& accel_m_s2) {
+void AddFault(const std::string& name, int count, const std::string& finding,
+              Recording* recording) {
+  recording->faults.push_back({name, count, finding});
+  recording->notes.push_back(finding);
+}
+
+void GyroCollector::Add(const GyroSample& sample, const std::optional<Eigen::Vector3d>& accel_m_s2,
+                        const std::function<std::string()>& place) {
   std::vector<GyroSample>& gyro = recording_->gyro;
-  if (!gyro.empty()) {
+  if (!gyro.empty() && sample.stamp_ns <= gyro.back().stamp_ns) {
     const GyroSample& last = gyro.back();
-    if (sample.stamp_ns == last.stamp_ns && sample.omega_gyro_rad_s == last.omega_gyro_rad_s &&
+    const bool equal = sample.stamp_ns == last.stamp_ns;
+    if (equal && sample.omega_gyro_rad_s == last.omega_gyro_rad_s &&
         (!accel_m_s2 || *accel_m_s2 == recording_->accel.back().accel_gyro_m_s2)) {
       ++repeated_;
-      return std::nullopt;
+      return;
     }
-    if (const auto wrong = NotIncreasing(last.stamp_ns, sample.stamp_ns)) return wrong;
+    std::optional<std::string>& first = equal ? equal_stamps_ : disorder_;
+    if (!first) first = place() + ": " + *NotIncreasing(last.stamp_ns, sample.stamp_ns);
   }
   gyro.push_back(sample);
   if (accel_m_s2) recording_->accel.push_back({sample.stamp_ns, *accel_m_s2});
-  return std::nullopt;
+}
+
+void GyroCollector::Keep(const std::vector<size_t>& kept) {
+  const bool accel = recording_->accel.size() == recording_->gyro.size();
+  for (size_t i = 0; i < kept.size(); ++i) {
+    recording_->gyro[i] = recording_->gyro[kept[i]];
+    if (accel) recording_->accel[i] = recording_->accel[kept[i]];
+  }
+  recording_->gyro.resize(kept.size());
+  if (accel) recording_->accel.resize(kept.size());
+}
+
+int DropRepeatedStamps(Recording* recording) {
+  const auto drop = [](auto* samples) {
+    const auto equal = [](const auto& a, const auto& b) { return a.stamp_ns == b.stamp_ns; };
+    const auto end = std::unique(samples->begin(), samples->end(), equal);
+    const auto dropped = samples->end() - end;
+    samples->erase(end, samples->end());
+    return static_cast<int>(dropped);
+  };
+  if (!recording->accel.empty()) drop(&recording->accel);
+  return drop(&recording->gyro);
+}
+
+Status GyroCollector::MendOrder(const std::string& file) {
+  std::vector<GyroSample>& gyro = recording_->gyro;
+  const size_t all = gyro.size();
+  const auto too_many = [&](size_t lost) { return 20 * lost > all; };
+  const auto refuse = [&](const std::string& first, size_t lost, const char* likely) {
+    return BadInput(
+        Concat(first, " (", lost, " of ", all, " samples have such stamps", likely, ")"));
+  };
+  if (disorder_) {
+    const std::vector<size_t> kept = LongestNonDecreasing(gyro);
+    const size_t lost = all - kept.size();
+    if (too_many(lost)) {
+      return refuse(*disorder_, lost, ": two streams in one file have to be separated first");
+    }
+    Keep(kept);
+    AddFault("stamps_step_back", static_cast<int>(lost),
+             Concat(*disorder_, "; ", lost, " samples that do not fit into the order are left out"),
+             recording_);
+  }
+  if (SamplesTakeTurns(gyro)) {
+    return BadInput(Concat(file,
+                           ": every other sample is of another sensor: neighbouring rates "
+                           "differ far more than those two rows apart; expected the samples "
+                           "of one gyro"));
+  }
+  if (!equal_stamps_) return {};
+  std::vector<int64_t> stamps_ns;
+  for (const GyroSample& sample : gyro) stamps_ns.push_back(sample.stamp_ns);
+  if (FindStampClock(stamps_ns).report.kind == StampKind::kArrival) return {};
+  const size_t lost = static_cast<size_t>(DropRepeatedStamps(recording_));
+  if (too_many(lost)) return refuse(*equal_stamps_, lost, "");
+  AddFault(
+      "stamps_repeat", static_cast<int>(lost),
+      Concat(*equal_stamps_, "; the first sample of each stamp is used, ", lost, " are left out"),
+      recording_);
+  return {};
 }
 
 Status GyroCollector::Finish(const std::string& file) {
@@ -36,15 +145,18 @@ Status GyroCollector::Finish(const std::string& file) {
   if (gyro.size() < 2) {
     return BadInput(Concat(file, ": has ", gyro.size(), " samples, expected at least two"));
   }
-  if (MedianInterval(gyro) * kFastestGyroHz < 1.0) {
-    return BadInput(Concat(file, ": the median interval of its stamps is ",
-                           MedianInterval(gyro) * 1e9,
+  if (Status order = MendOrder(file); !order) return order;
+  const double interval_s = SecondsSince(gyro.front().stamp_ns, gyro.back().stamp_ns) /
+                            static_cast<double>(gyro.size() - 1);
+  if (interval_s * kFastestGyroHz < 1.0) {
+    return BadInput(Concat(file, ": the mean interval of its stamps is ", interval_s * 1e9,
                            " ns, too short for any gyro; expected stamps in nanoseconds"));
   }
   if (Status unit = CheckRateUnit(file, gyro); !unit) return unit;
   if (repeated_ > 0) {
-    recording_->notes.push_back(
-        Concat(file, ": ", repeated_, " rows that repeat the one before were dropped"));
+    AddFault("samples_repeat", repeated_,
+             Concat(file, ": ", repeated_, " rows that repeat the one before were dropped"),
+             recording_);
   }
   return {};
 }

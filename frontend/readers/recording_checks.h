@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,25 +14,43 @@
 
 namespace camgyro {
 
-// Collects gyro samples as a reader comes upon them.
+// Something was wrong with the data and has been mended: counted, and noted for the user.
+void AddFault(const std::string& name, int count, const std::string& finding, Recording* recording);
+
+// Collects gyro samples as a reader comes upon them, in the file's order, and decides on those
+// whose stamps are out of order.
 class GyroCollector {
  public:
   explicit GyroCollector(Recording* recording) : recording_(recording) {}
 
   // Appends a sample, and the specific force [m/s^2] taken with it, if there is one (in all samples
-  // or in none). One that repeats the one before exactly is dropped. Returns what is wrong if its
-  // stamp does not increase; the caller knows the place.
-  [[nodiscard]] std::optional<std::string> Add(const GyroSample& sample,
-                                               const std::optional<Eigen::Vector3d>& accel_m_s2);
+  // or in none). `place` is asked where this is ("file:line") if the stamp does not increase.
+  void Add(const GyroSample& sample, const std::optional<Eigen::Vector3d>& accel_m_s2,
+           const std::function<std::string()>& place);
 
-  // Checks the whole: two samples or more, stamps that can be nanoseconds, rates that can be rad/s.
-  // Notes what was dropped. `file` is named in messages.
+  // Checks the whole: two samples or more, stamps that can be nanoseconds, rates that can be rad/s;
+  // `file` is named in messages. Mends the order, and records every repair in the faults:
+  //   - rows that repeat the one before exactly are dropped;
+  //   - of stamps that step back, those of the longest increasing sequence stay;
+  //   - of samples with equal stamps the first stays, unless the stamps are arrival times: then all
+  //     stay, and stamps are only non-decreasing until RepairStamps (or DropRepeatedStamps).
+  // Error, at the first place, if more than a twentieth of the samples would be lost so, or if the
+  // samples of two sensors take turns in the file.
   Status Finish(const std::string& file);
 
  private:
+  void Keep(const std::vector<size_t>& kept);
+  Status MendOrder(const std::string& file);
+
   Recording* recording_;
-  int repeated_ = 0;
+  int repeated_ = 0;                         // exactly
+  std::optional<std::string> disorder_;      // the first stamp that goes back: where and how
+  std::optional<std::string> equal_stamps_;  // the first that repeats with other values
 };
+
+// Drops samples whose stamps are not after the one before, the accelerometer's with them if it has
+// the gyro's stamps. Returns how many of the gyro.
+int DropRepeatedStamps(Recording* recording);
 
 // Error if the 99th percentile of |w| is beyond the full scale of gyros, 2000 deg/s: the rates are
 // in deg/s then. Slow motion in deg/s passes; only the camera can tell there.

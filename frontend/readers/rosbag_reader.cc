@@ -166,9 +166,8 @@ Status ReadImu(const std::string& path, const rosbag::Bag& bag, const std::strin
                       "angular_velocity or linear_acceleration is not "
                       "finite");
     }
-    if (const auto wrong = gyro.Add({StampNs(imu->header.stamp), rates}, accel)) {
-      return BadInput(Place(path, topic, index) + *wrong);
-    }
+    gyro.Add({StampNs(imu->header.stamp), rates}, accel,
+             [&] { return Concat(path, ": ", topic, ", message ", index + 1); });
     ++index;
   }
   return gyro.Finish(path + ": " + topic);

@@ -24,7 +24,7 @@ Status ReadGyroRows(const std::string& file, const SampleColumns& columns, CsvRe
     std::optional<Eigen::Vector3d> accel;
     if (columns.accel) accel = columns.accel_map * Vector(*columns.accel, csv);
     if (!csv->status()) break;
-    if (const auto wrong = gyro.Add({stamp_ns, rates}, accel)) csv->Fail(*wrong);
+    gyro.Add({stamp_ns, rates}, accel, [csv] { return csv->Place(); });
   }
   if (!csv->status()) return csv->status();
   return gyro.Finish(file);

@@ -32,9 +32,12 @@ struct Place {
   int byte = 0;
 };
 
+std::string InWords(const Place& place) {
+  return Concat(place.file, ": record ", place.record, ", at byte ", place.byte);
+}
+
 tl::unexpected<Error> Refuse(const Place& place, const std::string& message) {
-  return BadInput(
-      Concat(place.file, ": record ", place.record, ", at byte ", place.byte, ": ", message));
+  return BadInput(InWords(place) + ": " + message);
 }
 
 Status AddImuSample(const Place& place, const std::string& bytes, GyroCollector* gyro) {
@@ -52,7 +55,7 @@ Status AddImuSample(const Place& place, const std::string& bytes, GyroCollector*
   if (!rates.allFinite() || (accel && !accel->allFinite())) {
     return Refuse(place, "gyro or accel is not finite");
   }
-  if (const auto wrong = gyro->Add({sample.time_ns(), rates}, accel)) return Refuse(place, *wrong);
+  gyro->Add({sample.time_ns(), rates}, accel, [&] { return InWords(place); });
   return {};
 }
 

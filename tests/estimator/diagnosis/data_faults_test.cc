@@ -74,6 +74,47 @@ TEST(DataFaults, DroppedFramesAndSamples) {
   EXPECT_THAT(faults[1].finding, HasSubstr("105 ms"));
 }
 
+// Every fifth picture is shown twice, with the stamp of the one that is missing.
+TEST(DataFaults, RepeatedPicturesAreLeftOut) {
+  const Recording sound = Simulate({"motion.kind=running"}).recording;
+  Recording recording = sound;
+  int repeats = 0;
+  for (size_t i = 5; i + 1 < recording.tracks.size(); i += 5) {
+    recording.tracks[i] = recording.tracks[i - 1];
+    ++repeats;
+  }
+  Recording with_matches = recording;
+  with_matches.matches = PairsFromTracks(recording.tracks, 1);
+  with_matches.tracks.clear();
+  const int dropped = DropRepeatedPictures(&recording);
+  EXPECT_GT(dropped, 0.9 * repeats);  // a few lie where the camera is hardly moving
+  EXPECT_EQ(recording.frames.size(), sound.frames.size() - static_cast<size_t>(dropped));
+  EXPECT_EQ(recording.tracks.size(), recording.frames.size());
+  ASSERT_EQ(recording.faults.size(), 1u);
+  EXPECT_EQ(recording.faults[0].name, "duplicated_frames");
+  EXPECT_EQ(recording.faults[0].count, dropped);
+  for (size_t i = 1; i < recording.frames.size(); ++i) {  // each picture has its own stamp again
+    const auto of = std::find_if(sound.frames.begin(), sound.frames.end(), [&](const Frame& f) {
+      return f.stamp_ns == recording.frames[i].stamp_ns;
+    });
+    ASSERT_NE(of, sound.frames.end());
+  }
+  EXPECT_EQ(DropRepeatedPictures(&with_matches), dropped);
+  ASSERT_EQ(with_matches.frames.size(), recording.frames.size());
+  for (const FramePair& pair : with_matches.matches) {
+    EXPECT_EQ(pair.frame_b, pair.frame_a + 1);
+    const Match& match = pair.matches.front();
+    const auto& points = recording.tracks[static_cast<size_t>(pair.frame_b)];
+    EXPECT_TRUE(std::any_of(points.begin(), points.end(),
+                            [&](const TrackedPoint& p) { return p.px == match.px_b; }));
+  }
+
+  Recording untouched = sound;
+  EXPECT_EQ(DropRepeatedPictures(&untouched), 0);
+  EXPECT_EQ(untouched.frames.size(), sound.frames.size());
+  EXPECT_TRUE(untouched.faults.empty());
+}
+
 TEST(DataFaults, DuplicatedFrames) {
   Recording recording = Simulate({"motion.kind=running"}).recording;
   for (const size_t i : {50u, 120u}) recording.tracks[i] = recording.tracks[i - 1];

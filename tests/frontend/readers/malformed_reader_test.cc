@@ -88,7 +88,8 @@ const Malformed kMalformed[] = {
   {"AttitudeZero", "cam0/attitude.csv", "1000000000,0,0,0,0\n", {"cam0/attitude.csv:1:", "norm is 0", "expected 1"}},
   {"AttitudeMissing", "cam0/attitude.csv", "1000000000,1,0,0,0\n1066000000,1,0,0,0\n",
    {"cam0/attitude.csv:", "1033000000 has no attitude", "expected one row for every frame"}},
-  {"AttitudeRepeats", "cam0/attitude.csv", "1000000000,1,0,0,0\n1000000000,1,0,0,0\n", {"cam0/attitude.csv:2:", "1000000000 repeats"}},
+  {"AttitudeRepeats", "cam0/attitude.csv", "1000000000,1,0,0,0\n1000000000,0,1,0,0\n",
+   {"cam0/attitude.csv:2:", "1000000000 repeats with another attitude"}},
 
   {"YamlBroken", "cam0/sensor.yaml", "resolution: [64, 48]\nintrinsics: [1, 2\nrate_hz: 30\n", {"cam0/sensor.yaml:", "not valid YAML"}},
   {"YamlNotAMap", "cam0/sensor.yaml", "- 1\n- 2\n", {"cam0/sensor.yaml:1:", "expected lines of `key: value`"}},
