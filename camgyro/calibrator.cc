@@ -18,6 +18,8 @@
 #include "camgyro/online_calibration.h"
 #include "core/time.h"
 #include "estimator/vins/initialise.h"
+#include "frontend/stamp_clock.h"
+#include "frontend/streaming_clock.h"
 #include "frontend/track_cleaner.h"
 #include "frontend/tracker.h"
 
@@ -79,8 +81,6 @@ class Calibrator::Worker {
     if (gyro_in_.size() >= kMaxSamplesWaiting) return AddResult::kQueueFull;
     last_gyro_ns_ = sample.stamp_ns;
     gyro_in_.push_back(sample);
-    recent_gyro_.push_back(sample);
-    Trim(&recent_gyro_, kRecentSamplesS, kMaxRecentSamples);
     wake_.notify_one();
     return AddResult::kAccepted;
   }
@@ -259,7 +259,23 @@ class Calibrator::Worker {
     Stop("stopped by an error: " + reason);
   }
 
-  void Process(const std::vector<GyroSample>& gyro, FrameIn* frame, MatchNoise noise) {
+  // Puts the samples on their clock, if they are not, and keeps the latest.
+  std::vector<GyroSample> TakeGyro(const std::vector<GyroSample>& recorded) {
+    std::vector<GyroSample> gyro;
+    if (options_.stamps == Stamps::kRecorded) {
+      gyro = recorded;
+    } else {
+      for (const GyroSample& sample : recorded) clock_.Add(sample, &gyro);
+    }
+    if (gyro.empty()) return gyro;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    recent_gyro_.insert(recent_gyro_.end(), gyro.begin(), gyro.end());
+    Trim(&recent_gyro_, kRecentSamplesS, kMaxRecentSamples);
+    return gyro;
+  }
+
+  void Process(const std::vector<GyroSample>& recorded, FrameIn* frame, MatchNoise noise) {
+    const std::vector<GyroSample> gyro = TakeGyro(recorded);
     if (!online_ && frame != nullptr) {
       online_.emplace(camera_, noise, options_.start_s,
                       [this](const OnlineCalibration::Progress& progress) { Publish(progress); });
@@ -289,6 +305,7 @@ class Calibrator::Worker {
     auto next = std::make_shared<Snapshot>();
     next->stage = progress.estimating ? Stage::kEstimating : Stage::kCollecting;
     next->message = progress.message;
+    if (clock_.report()) next->gyro_stamps = DescribeStamps(*clock_.report());
     next->frame_stamp_ns = progress.frame_stamp_ns;
     next->noise_px = progress.noise_px;
     next->frames = progress.frames;
@@ -368,6 +385,7 @@ class Calibrator::Worker {
   // The worker's own.
   KltTracker tracker_;
   TrackCleaner cleaner_;
+  StreamingClock clock_;
   std::optional<OnlineCalibration> online_;
   std::deque<GyroSample> early_gyro_;  // before the first frame
   std::thread thread_;                 // last: starts when all else is there

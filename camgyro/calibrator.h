@@ -33,6 +33,9 @@ struct CalibratorOptions {
   double ready_delay_s = 1e-3;
   double ready_bias_rad_s = 5e-3;
   double ready_rotation_rad = 10e-3;
+  // Stamps of the gyro that are times of arrival are replaced by the sampling clock behind them,
+  // with kAuto; samples then reach the estimate half a second later. The accelerometer's stay.
+  Stamps stamps = Stamps::kAuto;
   // Seconds of motion before the first search for a start.
   double start_s = 5.0;
   // Images (or frames of tracks) that wait for the worker; beyond, kQueueFull.
@@ -64,6 +67,7 @@ struct ParameterState {
 struct Snapshot {
   Stage stage = Stage::kCollecting;
   std::string message;      // for people
+  std::string gyro_stamps;  // what they are, for people; empty before two seconds, or kRecorded
   Calibration calibration;  // meaningful once `has_estimate`
   bool has_estimate = false;
   std::array<ParameterState, kParameters> parameters{};

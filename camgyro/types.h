@@ -85,6 +85,11 @@ struct Calibration {
   std::array<double, kParameters * kParameters> covariance{};  // row after row
 };
 
+enum class Stamps {
+  kAuto,      // repaired where they are clearly times of arrival
+  kRecorded,  // used as they are
+};
+
 // What is known before. Absent: to be found.
 struct CameraGuess {
   int width_px = 0, height_px = 0;  // needed

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -135,6 +136,26 @@ TEST(Calibrator, FindsTheTruthAndSaysWhenItIsReady) {
   EXPECT_NEAR(speed, truth.v_world_m_s.norm(), 0.12);
   EXPECT_EQ(start.covariance.size(), start.covariance_size * start.covariance_size);
   EXPECT_EQ(start.covariance_size, 9 * start.states.size() + 9 + kParameters);
+}
+
+// Stamps of a phone's logger: late by 2 ms in the mean, which would be a part of the delay.
+TEST(Calibrator, LaysArrivalTimesOnTheirClock) {
+  const Scenario scenario = LivelyScenario(9.0);
+  Simulated s = simulation::SimulateTracks(scenario).value();
+  std::mt19937 random(2);
+  std::exponential_distribution<double> latency_s(1.0 / 2e-3);
+  int64_t last_ns = 0;
+  for (GyroSample& sample : s.recording.gyro) {
+    last_ns = std::max(last_ns + 1000, StampAt(sample.stamp_ns, latency_s(random)));
+    sample.stamp_ns = last_ns;
+  }
+  const auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  const auto snapshot = calibrator->snapshot();
+  EXPECT_THAT(snapshot->gyro_stamps, testing::HasSubstr("arrival times"));
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  EXPECT_NEAR(snapshot->calibration.delay_s, s.truth.delay_s, 0.4e-3);
 }
 
 TEST(Calibrator, WrongAskedPrecisionIsNotReady) {
