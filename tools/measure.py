@@ -63,6 +63,8 @@ RECORDINGS = [
     ("euroc-v101-flight", "lens given", dict(f=457.296, c=(367.215, 248.375), tr=0.0, td=0.0,
                                              R=EUROC)),
     ("euroc-v101-rest", "", dict(f=457.296, c=(367.215, 248.375), tr=0.0, td=0.0, R=EUROC)),
+    # README: the axis map is Android's.
+    ("phone-edge-hand", "", dict(R=ANDROID)),
     ("ov_handheld_gs", "lens given", dict(OV, tr=0.0)),
     ("ov_handheld_rs", "lens given", dict(OV, tr=25.0)),
     ("ov_handheld_rs_skew", "lens given", dict(OV, tr=25.0)),
@@ -74,7 +76,10 @@ RECORDINGS = [
     ("tablet-attitude/" + name, "", dict(td=td, td_is_ours=True, R=ANDROID))
     for name, td in [("D01", 63.6), ("D02", 993.0), ("D03", 10477.4), ("D04", 41139.2),
                      ("D05", 31.7), ("D06", 464951.4), ("D07", 38216.6), ("D08", 2500.9),
-                     ("D10", 98.8), ("D11", 24.6), ("D12", 18981.1), ("D13", 18617.8)]]
+                     ("D10", 98.8), ("D11", 24.6), ("D12", 18981.1), ("D13", 18617.8)]
+] + [("tango-walk/imu%d" % i, "", {}) for i in range(1, 6)] + [
+    # README: ARKit fuses this very gyro.
+    ("arkit-attitude/demo1", "", dict(td=0.0))]
 
 
 def with_lens(recording, folder):
@@ -115,6 +120,7 @@ def read_result(folder):
         result[key] = [[1e3 * x for x in values] for values in result[key]]
     for key in ("noise_px", "rms_px", "unseen_rms_px", "noise_rad", "inlier_ratio"):
         result[key] = scalar(text, key)
+    result["mended"] = "repaired: true" in text or "mended: true" in text
     result["unobservable"] = re.search(r"unobservable: \[(.*)\]", text).group(1).split(", ")
     with open(os.path.join(folder, "trace.csv")) as file:
         rows = list(csv.DictReader(line.lstrip("#") for line in file))
@@ -135,7 +141,7 @@ def run(camgyro, recording, folder):
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     outcome = dict(exit_code=done.returncode, cpu_s=cpu, out=done.stdout,
                    message=done.stderr.strip().split("\n")[-1])
-    if done.returncode == 0:
+    if os.path.exists(os.path.join(folder, "calibration.yaml")):
         outcome.update(read_result(folder))
         rate = re.search(r"window [0-9.]+ s \(([0-9.]+) frames/s\)", done.stdout)
         outcome["frames_s"] = rate.group(1) if rate else ""
@@ -159,10 +165,19 @@ def cell(result, key, name, known, digits):
     return text
 
 
-def value_row(name, truth, r):
+def first_try(r):
+    """What somebody gets who gives the recording to the program as it is."""
+    if "f" not in r:
+        return "no"
     if r["exit_code"] != 0:
+        return "nothing determined"
+    return "after repair" if r["mended"] else "yes"
+
+
+def value_row(name, truth, r):
+    if "f" not in r:
         message = r["message"].replace("camgyro: ", "").replace("|", "/")
-        return "| %s | %d | %s |" % (name, r["exit_code"], message) + " |" * 5
+        return "| %s | %s | %d | %s |" % (name, first_try(r), r["exit_code"], message) + " |" * 5
     turn = angle_deg(matrix(*r["q"][0]), truth["R"]) if "R" in truth else None
     turn_sigma = math.degrees(math.sqrt(sum(x * x for x in r["q"][1])))
     q = "-" if turn is None else "%.2f ± %.2f" % (turn, turn_sigma)
@@ -170,7 +185,7 @@ def value_row(name, truth, r):
         q = "(" + q + ")"
     td = cell(r, "td", "delay_s", truth.get("td"), 2) + ("*" if truth.get("td_is_ours") else "")
     doubts = "; ".join(r["doubts"]) or "calibrated"
-    return "| " + " | ".join([name, "0", doubts, cell(r, "f", "focal_px", truth.get("f"), 1),
+    return "| " + " | ".join([name, first_try(r), str(r["exit_code"]), doubts, cell(r, "f", "focal_px", truth.get("f"), 1),
                               cell(r, "c", "cx_px", truth.get("c"), 1),
                               cell(r, "tr", "readout_s", truth.get("tr"), 2), td, q]) + " |"
 
@@ -222,7 +237,7 @@ def main():
             print("%s: exit code %d, %.0f s CPU\n%s%s" % (
                 label, r["exit_code"], r["cpu_s"], r["out"], r["message"]), flush=True)
             values.append(value_row(label, truth, r))
-            if r["exit_code"] == 0:
+            if "f" in r:
                 quality.append(quality_row(label, r))
             if "online" in r:
                 online.append(online_row(label, truth, r))
@@ -234,9 +249,10 @@ def main():
         out.write("## Values\n\nvalue ± sigma / what is known independently. In brackets: not "
                   "determined by this motion, says the program. q_c: angle to the known mounting, "
                   "and the norm of its three sigmas. *: a fit of ours, not independent. Exit code "
-                  "4: could not estimate.\n\n"
-                  "| Recording | Exit | Verdict | f [px] | c [px] | t_r [ms] | t_d [ms] | "
-                  "q_c [deg] |\n|" + " --- |" * 8 + "\n" + "\n".join(values) + "\n\n")
+                  "4: could not estimate. First try: what somebody gets who knows nothing of "
+                  "the recording; after repair: the program mended stamps or samples by itself.\n\n"
+                  "| Recording | First try | Exit | Verdict | f [px] | c [px] | t_r [ms] | t_d [ms] | "
+                  "q_c [deg] |\n|" + " --- |" * 9 + "\n" + "\n".join(values) + "\n\n")
         out.write("## Quality and time\n\nFrames/s: of the online pass, wall clock; CPU: of the "
                   "whole command, tracking included.\n\n"
                   "| Recording | Noise | Inliers | rms | Unseen rms | Frames/s | CPU [s] |\n|"
