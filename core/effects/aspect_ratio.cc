@@ -19,12 +19,9 @@ class AspectRatio final : public Effect {
 
 EffectEntry AspectRatioEntry() {
   return WithOneShape<AspectRatio>(
-      {"aspect_ratio",
-       ModelPart::kLens,
+      {"aspect_ratio", ModelPart::kLens,
        "width and height of the picture are scaled differently: the pixels are not square",
-       "look for a video mode that crops or scales one direction; use fx = aspect_ratio * f",
-       {},
-       {}},
+       "look for a video mode that crops or scales one direction; use fx = aspect_ratio * f"},
       "constant", NeedsPixels);
 }
 

@@ -51,13 +51,10 @@ class BiasCurve final : public Effect {
 
 // Shapes: linear (the bias is then that in the middle of the recording), curve (a spline).
 EffectEntry BiasDriftEntry() {
-  EffectEntry entry = {"bias_drift",
-                       ModelPart::kRate,
+  EffectEntry entry = {"bias_drift", ModelPart::kRate,
                        "the gyro's bias changes during the recording: the device warms up",
                        "let the device run for some minutes first; use the bias as a function of "
-                       "time",
-                       {},
-                       {}};
+                       "time"};
   entry.shapes = [](const EffectSetup&) { return std::vector<std::string>{"linear", "curve"}; };
   entry.make = [](const EffectSetup& setup,
                   const std::string& shape) -> std::shared_ptr<const Effect> {

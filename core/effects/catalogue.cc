@@ -104,9 +104,9 @@ LensParameters EffectSet::ConstantLens(const LensParameters& lens,
   return sum;
 }
 
-double EffectSet::turn_sigma_rad_s() const {
+double EffectSet::widened_sigma(PairLatent latent) const {
   double sigma = 0.0;
-  for (const Item& item : items_) sigma = std::max(sigma, item.effect->turn_sigma_rad_s());
+  for (const Item& item : items_) sigma = std::max(sigma, item.effect->widened_sigma(latent));
   return sigma;
 }
 

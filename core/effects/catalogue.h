@@ -50,8 +50,8 @@ class EffectSet {
   Eigen::Matrix3d RateByRate(const double* values) const;
   // The lens block with the effects that are a constant part of it.
   LensParameters ConstantLens(const LensParameters& lens, const Eigen::VectorXd& values) const;
-  // The largest that an effect asks for; 0: none does.
-  double turn_sigma_rad_s() const;
+  // The widest prior of a latent that an effect asks for; 0: none does.
+  double widened_sigma(PairLatent latent) const;
 
  private:
   std::vector<Item> items_;

@@ -22,12 +22,9 @@ class ClockSkew final : public Effect {
 // The delay is then that at the first gyro stamp.
 EffectEntry ClockSkewEntry() {
   return WithOneShape<ClockSkew>(
-      {"clock_skew",
-       ModelPart::kShutterClock,
+      {"clock_skew", ModelPart::kShutterClock,
        "camera and gyro are timed by clocks of different speed: the delay grows steadily",
-       "multiply camera time by (1 + skew), or re-estimate the delay all the time",
-       {},
-       {}},
+       "multiply camera time by (1 + skew), or re-estimate the delay all the time"},
       "constant", AlwaysShown);
 }
 

@@ -34,13 +34,10 @@ class DelayWander final : public Effect {
 
 EffectEntry DelayWanderEntry() {
   return WithOneShape<DelayWander>(
-      {"delay_wander",
-       ModelPart::kShutterClock,
+      {"delay_wander", ModelPart::kShutterClock,
        "the delay between camera and gyro moves slowly to and fro",
        "look for stamps that are taken when a frame arrives, and for an exposure control; use "
-       "the delay as a function of time",
-       {},
-       {}},
+       "the delay as a function of time"},
       "curve", AlwaysShown);
 }
 

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,6 +40,11 @@ struct Observation {
   Eigen::Vector2d px;
   Eigen::Vector2d size_px;  // width, height of the picture
   FrameTime frame;
+};
+
+// What every pair of frames has of its own, with a prior of its own width.
+enum class PairLatent {
+  kTurn,  // of the translation direction [rad/s], factors/coplanarity_plane.h
 };
 
 // Columns: the parameters. What one unit of each changes:
@@ -76,8 +82,12 @@ class Effect {
   virtual bool is_constant_lens() const { return false; }
   // Made from a calibration so exactly that it is to be made anew when that has moved.
   virtual bool depends_on_calibration() const { return false; }
-  // Prior of the translation direction's turn that this effect needs [rad/s]; 0: as it is.
-  virtual double turn_sigma_rad_s() const { return 0.0; }
+  // An effect without parameters, that of every pair's latents instead: the standard deviation
+  // which it needs their prior to have, in the latent's unit; 0: as it is.
+  virtual double widened_sigma(PairLatent /*latent*/) const { return 0.0; }
+  bool widens_prior() const { return widened_sigma(PairLatent::kTurn) > 0.0; }
+  // Stamp of the first frame on which it acts [s], for effects that EffectEntry::step_at makes.
+  virtual std::optional<double> first_stamp_s() const { return std::nullopt; }
 
  private:
   const std::vector<EffectParameter> parameters_;
@@ -100,7 +110,14 @@ struct EffectSetup {
   double to_s() const { return frames.back().stamp_s + delay_s; }
 };
 
-// An entry of the catalogue.
+// An effect with the name of its shape.
+struct ShapedEffect {
+  std::string shape;
+  std::shared_ptr<const Effect> effect;  // null: there is none such
+};
+
+// An entry of the catalogue. What diagnosis does with an effect beyond its columns stands here and
+// in Effect: the loop knows no effect by its name.
 struct EffectEntry {
   std::string name;
   ModelPart part;
@@ -109,10 +126,20 @@ struct EffectEntry {
   // Shapes that this recording can show, by name, the usual one last (it is taken where none is
   // asked for); empty where it has not what the effect needs. Effects without parameters of their
   // own have none.
-  std::function<std::vector<std::string>(const EffectSetup&)> shapes;
+  std::function<std::vector<std::string>(const EffectSetup&)> shapes = {};
   // The effect in a shape (also one with a number that shapes() does not list, where the entry's
   // file says so); null if there is no such shape here.
-  std::function<std::shared_ptr<const Effect>(const EffectSetup&, const std::string& shape)> make;
+  std::function<std::shared_ptr<const Effect>(const EffectSetup&, const std::string& shape)> make =
+      {};
+  // For an effect that changes t_d by a step and whose shape is the time of that step, which
+  // diagnosis searches: the effect from the first frame on whose stamp is not before `stamp_s`.
+  // Null for all others.
+  std::function<ShapedEffect(const EffectSetup&, double stamp_s)> step_at = {};
+  // Several of it add up, as steps do; of others, one shape takes the place of another.
+  bool adds_up = false;
+  // At sizes that real devices have, the plain model without it is so far off that its linear
+  // gain says little: where a fit has gone astray, a refit with it is tried in any case.
+  bool leads_astray = false;
 };
 
 }  // namespace camgyro

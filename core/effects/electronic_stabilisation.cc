@@ -6,14 +6,11 @@ namespace camgyro {
 
 // No parameters: estimator/diagnosis/ recognises it and refuses.
 EffectEntry ElectronicStabilisationEntry() {
-  return WithoutShape({"electronic_stabilisation",
-                       ModelPart::kPicture,
+  return WithoutShape({"electronic_stabilisation", ModelPart::kPicture,
                        "the picture was stabilised before it was stored: fast rotation is missing "
                        "from it",
                        "switch the electronic stabilisation off and record again; such a recording "
-                       "cannot be calibrated",
-                       {},
-                       {}});
+                       "cannot be calibrated"});
 }
 
 }  // namespace camgyro

@@ -31,13 +31,10 @@ bool ExposuresVary(const EffectSetup& setup) {
 
 EffectEntry ExposureDelayEntry() {
   return WithOneShape<ExposureDelay>(
-      {"exposure_delay",
-       ModelPart::kShutterClock,
+      {"exposure_delay", ModelPart::kShutterClock,
        "the stamps mark a moment of the exposure other than its middle, so that the delay "
        "follows the exposure time",
-       "add factor * exposure to each stamp (0.5: the stamps are starts of the exposure)",
-       {},
-       {}},
+       "add factor * exposure to each stamp (0.5: the stamps are starts of the exposure)"},
       "factor", ExposuresVary);
 }
 

@@ -43,13 +43,10 @@ class FocalCurve final : public Effect {
 
 // Shapes: linear (f at the first gyro stamp, and its rate), curve (a spline over the recording).
 EffectEntry FocalDriftEntry() {
-  EffectEntry entry = {"focal_drift",
-                       ModelPart::kLens,
+  EffectEntry entry = {"focal_drift", ModelPart::kLens,
                        "the focal length changes during the recording: the lens refocuses or "
                        "grows warm",
-                       "lock the focus; else use f as a function of time",
-                       {},
-                       {}};
+                       "lock the focus; else use f as a function of time"};
   entry.shapes = [](const EffectSetup& setup) {
     return setup.has_pixels ? std::vector<std::string>{"linear", "curve"}
                             : std::vector<std::string>{};

@@ -28,13 +28,10 @@ class GyroAxisDelay final : public Effect {
 
 EffectEntry GyroAxisDelayEntry() {
   return WithOneShape<GyroAxisDelay>(
-      {"gyro_axis_delay",
-       ModelPart::kRate,
+      {"gyro_axis_delay", ModelPart::kRate,
        "rotation about the three axes is seen at different times: the gyro's axes are not sampled "
        "together, or attitudes come from a rolling shutter",
-       "shift the gyro's axes in time by these delays",
-       {},
-       {}},
+       "shift the gyro's axes in time by these delays"},
       "constant", RateDerivatives::Possible);
 }
 

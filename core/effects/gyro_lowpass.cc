@@ -26,14 +26,11 @@ class GyroLowpass final : public Effect {
 
 EffectEntry GyroLowpassEntry() {
   return WithOneShape<GyroLowpass>(
-      {"gyro_lowpass",
-       ModelPart::kRate,
+      {"gyro_lowpass", ModelPart::kRate,
        "the gyro's low-pass filter attenuates fast rotation, and delays the gyro by its time "
        "constant (a part of the delay found)",
        "set a wider bandwidth in the gyro; with another bandwidth the delay changes by the "
-       "difference of the time constants",
-       {},
-       {}},
+       "difference of the time constants"},
       "first_order", RateDerivatives::Possible);
 }
 

@@ -27,12 +27,9 @@ class GyroMisalignment final : public Effect {
 
 EffectEntry GyroMisalignmentEntry() {
   return WithOneShape<GyroMisalignment>(
-      {"gyro_misalignment",
-       ModelPart::kRate,
+      {"gyro_misalignment", ModelPart::kRate,
        "the axes of the gyro are not at right angles to each other",
-       "multiply the readings by the inverse of I + S",
-       {},
-       {}},
+       "multiply the readings by the inverse of I + S"},
       "constant", AlwaysShown);
 }
 

@@ -22,12 +22,9 @@ class GyroScale final : public Effect {
 
 EffectEntry GyroScaleEntry() {
   return WithOneShape<GyroScale>(
-      {"gyro_scale",
-       ModelPart::kRate,
+      {"gyro_scale", ModelPart::kRate,
        "the gyro reads too much or too little, in proportion to the rate, on each axis",
-       "divide each axis by 1 + its scale error",
-       {},
-       {}},
+       "divide each axis by 1 + its scale error"},
       "constant", AlwaysShown);
 }
 

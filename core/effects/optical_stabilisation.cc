@@ -60,14 +60,11 @@ class OpticalStabilisation final : public Effect {
 
 // Shapes: the corner frequency in Hz.
 EffectEntry OpticalStabilisationEntry() {
-  EffectEntry entry = {"optical_stabilisation",
-                       ModelPart::kLens,
+  EffectEntry entry = {"optical_stabilisation", ModelPart::kLens,
                        "the lens moves against fast rotation, so that the picture turns less "
                        "than the camera",
                        "switch the optical stabilisation off; else the principal point is a "
-                       "function of time, and only slow rotation shows the focal length",
-                       {},
-                       {}};
+                       "function of time, and only slow rotation shows the focal length"};
   entry.shapes = [](const EffectSetup& setup) {
     return setup.has_pixels ? std::vector<std::string>{"0.15", "0.5", "1"}
                             : std::vector<std::string>{};

@@ -50,13 +50,15 @@ std::shared_ptr<const Effect> Make(const EffectSetup& setup, const std::string& 
 }  // namespace
 
 EffectEntry RadialDistortionEntry() {
-  return {"radial_distortion",
-          ModelPart::kLens,
-          "the lens bends straight lines: the picture is stretched or squeezed towards its edge",
-          "declare the fitted distortion (camera: distortion: of calibration.yaml) in sensor.yaml, "
-          "and use it wherever the focal length is used",
-          Shapes,
-          Make};
+  EffectEntry entry = {
+      "radial_distortion", ModelPart::kLens,
+      "the lens bends straight lines: the picture is stretched or squeezed towards its edge",
+      "declare the fitted distortion (camera: distortion: of calibration.yaml) in sensor.yaml, "
+      "and use it wherever the focal length is used"};
+  entry.shapes = Shapes;
+  entry.make = Make;
+  entry.leads_astray = true;
+  return entry;
 }
 
 }  // namespace camgyro

@@ -20,12 +20,9 @@ class ReadoutDirection final : public Effect {
 
 EffectEntry ReadoutDirectionEntry() {
   return WithOneShape<ReadoutDirection>(
-      {"readout_direction",
-       ModelPart::kShutterClock,
+      {"readout_direction", ModelPart::kShutterClock,
        "the sensor is not read row by row from top to bottom: it is turned, or reads backwards",
-       "use the sign of the readout time; for columns, turn the picture by 90 degrees before use",
-       {},
-       {}},
+       "use the sign of the readout time; for columns, turn the picture by 90 degrees before use"},
       "columns", NeedsPixels);
 }
 

@@ -20,12 +20,9 @@ class ReadoutNonlinear final : public Effect {
 
 EffectEntry ReadoutNonlinearEntry() {
   return WithOneShape<ReadoutNonlinear>(
-      {"readout_nonlinear",
-       ModelPart::kShutterClock,
+      {"readout_nonlinear", ModelPart::kShutterClock,
        "rows are not read at an even pace: the middle row comes early or late",
-       "look for a video mode with binning, pauses or several exposures per frame",
-       {},
-       {}},
+       "look for a video mode with binning, pauses or several exposures per frame"},
       "bend", NeedsPixels);
 }
 

@@ -20,13 +20,10 @@ class TangentialDistortion final : public Effect {
 
 EffectEntry TangentialDistortionEntry() {
   return WithOneShape<TangentialDistortion>(
-      {"tangential_distortion",
-       ModelPart::kLens,
+      {"tangential_distortion", ModelPart::kLens,
        "the lens is not centred or not parallel to the sensor, which bends one side of the "
        "picture more than the other",
-       "declare the fitted p1, p2 in sensor.yaml's distortion_coefficients",
-       {},
-       {}},
+       "declare the fitted p1, p2 in sensor.yaml's distortion_coefficients"},
       "radtan", [](const EffectSetup& setup) {
         return setup.has_pixels && setup.distortion_model != DistortionModel::kKannalaBrandt;
       });

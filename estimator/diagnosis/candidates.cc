@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "estimator/diagnosis/score_test.h"
+#include "estimator/diagnosis/thresholds.h"
 
 namespace camgyro {
 
@@ -17,9 +18,10 @@ std::vector<Candidate> MissingEffects(const Calibration& model, const EffectSetu
     }
     for (const std::string& shape : entry.shapes(setup)) {
       std::shared_ptr<const Effect> effect = entry.make(setup, shape);
-      if (effect == nullptr || effect->turn_sigma_rad_s() > 0.0) continue;
-      if (effect->size() > present_size)
+      if (effect == nullptr) continue;
+      if (effect->size() > present_size) {
         candidates.push_back({&entry, shape, std::move(effect), 0});
+      }
     }
   }
   return candidates;
@@ -30,7 +32,7 @@ void AddEffect(const Candidate& candidate, Calibration* calibration) {
   std::vector<double> values;
   if (calibration->effects) {
     for (const auto& item : calibration->effects->items()) {
-      if (item.entry == candidate.entry && item.entry->name != "delay_step") continue;
+      if (item.entry == candidate.entry && !item.entry->adds_up) continue;
       set->Add(item.entry, item.shape, item.effect);
       for (int k = 0; k < item.effect->size(); ++k) {
         values.push_back(calibration->effect_values[item.first + k]);
@@ -62,7 +64,6 @@ Eigen::VectorXd PriorInformation(const Prior& prior, const EffectSet* model,
 std::vector<std::vector<std::string>> Indistinguishable(
     const Calibration& fit, const EffectSetup& setup, const Prior& prior,
     const std::function<Scores(const Calibration&, std::shared_ptr<const EffectSet>)>& scores_of) {
-  constexpr double kAliasLimit = 0.95;
   std::vector<std::vector<std::string>> aliases;
   if (!fit.effects) return aliases;
   auto set = std::make_shared<EffectSet>();
@@ -85,13 +86,13 @@ std::vector<std::vector<std::string>> Indistinguishable(
   plain.effect_values.resize(0);
   plain.lens = fit.FullLens();
   const Scores scores = scores_of(plain, set);
-  if (scores.blocks.size() < 4) return aliases;
+  if (scores.blocks.size() < kLeastBlocks) return aliases;
   const Eigen::VectorXd information = PriorInformation(prior, nullptr, *set);
   for (size_t i = 0; i < in_model; ++i) {
     for (size_t j = i + 1; j < all.size(); ++j) {
       if (all[i].columns().empty() || all[j].columns().empty()) continue;
       // A flexible curve contains simpler effects: that is no alias of the motion.
-      if (all[j].columns().size() > 3 * all[i].columns().size() + 3) continue;
+      if (all[j].columns().size() > kAliasFactor * all[i].columns().size() + kAliasMore) continue;
       if (AliasOf(scores, all[i].columns(), all[j].columns(), information) > kAliasLimit) {
         aliases.push_back({all[i].entry->name, all[j].entry->name});
       }

@@ -25,13 +25,19 @@ struct Candidate {
     for (size_t i = 0; i < c.size(); ++i) c[i] = first + static_cast<int>(i);
     return c;
   }
+  // Instead of having parameters, it frees what pairs of frames have of their own.
+  bool widens_prior() const { return effect->widens_prior(); }
+  // Between rivals that gain alike, the smaller one wins: parameters, or more than any effect has
+  // of them for one that frees some in every pair.
+  int complexity() const { return widens_prior() ? 1000 : effect->size(); }
 };
 
-// Effects with parameters that the model has not, or only in a shape with fewer of them.
+// Effects that the model has not, or only in a shape with fewer parameters; without those whose
+// shape is a time, which is searched (EffectEntry::step_at).
 std::vector<Candidate> MissingEffects(const Calibration& model, const EffectSetup& setup);
 
-// The model's effects and one more; another shape of the same effect takes its place, steps of the
-// delay add up. Values carry over.
+// The model's effects and one more; another shape of the same effect takes its place, unless
+// they add up. Values carry over.
 void AddEffect(const Candidate& candidate, Calibration* calibration);
 
 // 1 / sigma^2 of the priors: state, effects of the model (may be null), candidates.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "estimator/diagnosis/step_time.h"
+#include "estimator/diagnosis/thresholds.h"
 
 namespace camgyro {
 namespace {
@@ -76,7 +77,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   input.start.bias_gyro_rad_s = report.start.bias_gyro_rad_s;
   input.graph = GraphOptionsFor(recording, report.start, options.calibrate);
   input.noise = report.quality.noise_px;
-  if (!(input.noise > 0.0)) input.noise = attitudes ? 2e-3 : 1.0;
+  if (!(input.noise > 0.0)) input.noise = attitudes ? kFirstNoiseRad : kFirstNoisePx;
   const Result<Calibration> found = FindEffects(input, options, progress, &diagnosis);
   if (!found) {
     diagnosis.not_tested = found.error().message;
@@ -84,7 +85,8 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   }
   const int bottom_up = kStateReadout;
   const Calibration& c = diagnosis.before->calibration;
-  if (c.determined[static_cast<size_t>(bottom_up)] && c.readout_s < -5.0 * c.sigma()[bottom_up]) {
+  if (c.determined[static_cast<size_t>(bottom_up)] &&
+      c.readout_s < -kReversedSigmas * c.sigma()[bottom_up]) {
     const EffectEntry* entry = FindEffect("readout_direction");
     diagnosis.faults.push_back({entry->name,
                                 "the readout time is negative: rows are read from bottom to top",
@@ -97,8 +99,8 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
     with.from = *found;
     // Once all frames may be seen, those of the report, too.
     const EstimationInput all = MakeEstimationInput(recording, SelectPairs(recording));
-    PlaceDelaySteps(recording, all, all.pairs, 1.5 * diagnosis.block_s, input.noise, input.graph,
-                    &*with.from);
+    PlaceDelaySteps(recording, all, all.pairs, kStepMarginBlocks * diagnosis.block_s, input.noise,
+                    input.graph, &*with.from);
     with.online = false;
     const Result<CalibrationReport> after =
         CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));

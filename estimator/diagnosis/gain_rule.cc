@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/diagnosis/thresholds.h"
+
 namespace camgyro {
 
 Gain CandidateResult::ExpectedGain() const {
@@ -13,20 +15,20 @@ Gain CandidateResult::ExpectedGain() const {
 }
 
 bool GainBearsOut(const CandidateResult& candidate, double tests) {
-  constexpr double kNoDoubt = 1e-5;    // p of all candidates together
-  constexpr double kNoiseAlone = 2.0;  // inflation
   const Gain& gain = candidate.gain;
   const double noise =
       2.0 * std::sqrt(std::max(0.0, gain.sum) * std::max(1.0, candidate.inflation));
-  if (gain.sum > 2.0 * gain.sigma || (gain.sum > 2.0 * noise && gain.lost < 0.1 * gain.sum)) {
+  if (gain.sum > kGainSigmas * gain.sigma ||
+      (gain.sum > kGainSigmas * noise && gain.lost < kHardlyAnyLoss * gain.sum)) {
     return true;
   }
   const bool no_doubt = candidate.p_value * tests < kNoDoubt;
   if (no_doubt && gain.sum > gain.sigma) return true;
   if (!no_doubt && candidate.inflation >= kNoiseAlone) return false;
   const Gain expected = candidate.ExpectedGain();
-  return (candidate.refitted || gain.sum > 0.0) && gain.sum + 2.0 * expected.sigma > expected.sum &&
-         gain.sigma < 2.0 * expected.sigma;
+  return (candidate.refitted || gain.sum > 0.0) &&
+         gain.sum + kGainSigmas * expected.sigma > expected.sum &&
+         gain.sigma < kGainSigmas * expected.sigma;
 }
 
 }  // namespace camgyro

@@ -14,12 +14,11 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double kFreeTurnRadS = 20.0;  // as translation_acceleration
-
 // The model's effects and the candidates side by side; candidates at zero.
 struct AllEffects {
   std::shared_ptr<const EffectSet> set;
   Eigen::VectorXd values;
+  double free_turn_rad_s = 0.0;  // what candidates widen the prior of the turn to; 0: none does
 };
 
 AllEffects Join(const Calibration& calibration, const EffectSet* candidates) {
@@ -34,6 +33,7 @@ AllEffects Join(const Calibration& calibration, const EffectSet* candidates) {
     for (const auto& item : candidates->items()) set->Add(item.entry, item.shape, item.effect);
   }
   AllEffects all;
+  if (candidates != nullptr) all.free_turn_rad_s = candidates->widened_sigma(PairLatent::kTurn);
   all.values = Eigen::VectorXd::Zero(set->size());
   if (present > 0) all.values.head(present) = calibration.effect_values;
   all.set = set;
@@ -78,7 +78,7 @@ struct PairSystem {
   Eigen::MatrixXd J, N;
   Eigen::VectorXd prior;  // of N's columns, 1 / sigma^2, around zero
   Eigen::VectorXd at;     // where they are
-  int bend_column = -1;   // of N; -1: none
+  int bend_column = -1;   // of N, where a candidate frees the bend; -1: none does
   BendVector free_bend;   // 1 / sigma^2 of a bend that is free
 };
 
@@ -122,7 +122,7 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
     return b.dot(factor.solve(b)) - s.at.dot(prior.cwiseProduct(s.at)) - log_det +
            prior.segment<6>(at).array().log().sum();
   };
-  pair->turn_gain = two_log(wide) - two_log(s.prior);
+  pair->latent_gain = two_log(wide) - two_log(s.prior);
 }
 
 bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Calibration& c,
@@ -184,13 +184,15 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
   }
   s->prior.setZero(s->N.cols());
   s->prior.segment<6>(2) = view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
-  s->free_bend = BendSigma(kFreeTurnRadS, c.readout_s, pair.time_b_s - pair.time_a_s)
-                     .cwiseAbs2()
-                     .cwiseInverse();
   s->prior.tail(3 * values) = rate_prior;
   s->at = Eigen::VectorXd::Zero(s->N.cols());
   s->at.segment<6>(2) = plane.bend;
-  s->bend_column = 2;
+  if (all.free_turn_rad_s > 0.0) {
+    s->bend_column = 2;
+    s->free_bend = BendSigma(all.free_turn_rad_s, c.readout_s, pair.time_b_s - pair.time_a_s)
+                       .cwiseAbs2()
+                       .cwiseInverse();
+  }
   return true;
 }
 
@@ -266,6 +268,14 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
     if (sum.pairs > 0) scores.blocks.push_back(std::move(sum));
   }
   return scores;
+}
+
+std::vector<double> LatentGain(const Scores& scores) {
+  std::vector<double> gain(scores.blocks.size(), 0.0);
+  for (const PairScore& pair : scores.pairs) {
+    gain[static_cast<size_t>(pair.block)] += pair.latent_gain;
+  }
+  return gain;
 }
 
 }  // namespace camgyro

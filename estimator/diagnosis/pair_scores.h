@@ -36,9 +36,9 @@ struct PairScore {
   int residuals = 0;
   Eigen::VectorXd g;
   Eigen::MatrixXd H;
-  // 2 log of the likelihood ratio of a direction that turns freely (0.6 rad per pair) against one
-  // that turns as the model allows.
-  double turn_gain = 0.0;
+  // 2 log of the likelihood ratio of latents with the prior that a candidate widens against those
+  // with the model's; 0 if none does.
+  double latent_gain = 0.0;
 };
 
 struct Scores {
@@ -51,6 +51,9 @@ struct Scores {
 Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>& blocks,
                      const Calibration& calibration, std::shared_ptr<const EffectSet> candidates,
                      double noise, const PairGraphOptions& options);
+
+// Sum of latent_gain by block.
+std::vector<double> LatentGain(const Scores& scores);
 
 }  // namespace camgyro
 

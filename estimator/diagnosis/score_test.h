@@ -61,21 +61,6 @@ Gain SumOf(const std::vector<double>& gain_by_block);
 // Fall of chi2 in each block if the parameters change by `step`.
 std::vector<double> GainOfStep(const Scores& scores, const Eigen::VectorXd& step);
 
-// Largest score statistic of a step of the delay over the time of the step.
-struct StepSearch {
-  ScoreTest test;       // p_value corrected for the search (James, James & Siegmund 1987)
-  double time_s = 0.0;  // of the second frame of the first pair after the step
-  int frame = 0;        // that frame, index into Recording::frames
-};
-// margin_s: from either end. Returns dof 0 if there are too few pairs.
-StepSearch SearchDelayStep(const Scores& scores, const Eigen::VectorXd& prior_information,
-                           double margin_s, const Scatter& usual = {});
-
-// The delay of each pair on its own: more scatter than noise? statistic: chi2 over dof pairs, after
-// division by `inflation`, the same scatter of what has no time in it (the focal length), at
-// least 1. estimate: per pair [s]; covariance: one column, the sigma of each.
-ScoreTest TestDelayOfPairs(const Scores& scores, const Eigen::VectorXd& prior_information);
-
 // |cosine| between two effects: correlation of their estimates' directions after the model's
 // columns are projected out (canonical, the largest); near 1: this motion cannot tell them apart.
 double AliasOf(const Scores& scores, const std::vector<int>& first, const std::vector<int>& second,

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/time.h"
+#include "estimator/diagnosis/thresholds.h"
 
 namespace camgyro {
 namespace {
@@ -38,7 +39,8 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input) {
   const double duration_s =
       SecondsSince(input.origin_ns, recording.frames.back().stamp_ns) - begin_s;
   shares.block_s =
-      std::max(std::clamp(duration_s / 40.0, 0.2, 3.0), 6.0 * MedianInterval(recording.frames));
+      std::max(std::clamp(duration_s / kBlocksPerRecording, kShortestBlockS, kLongestBlockS),
+               kLeastFramesOfBlock * MedianInterval(recording.frames));
   const auto block_of = [&](double time_s) {
     return static_cast<int64_t>(std::floor((time_s - begin_s) / shares.block_s));
   };
@@ -55,7 +57,6 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input) {
       }
     }
   }
-  constexpr size_t kMinMatches = 8;  // of a pair that can be evaluated
   std::vector<PairBlock> report_all;
   size_t usable = 0;
   int64_t last_block = -1;
@@ -75,10 +76,12 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input) {
       DropTracks(recording.tracks[static_cast<size_t>(pair.frame_a)],
                  recording.tracks[static_cast<size_t>(pair.frame_b)], seen,
                  &blocks.back().back().matches);
-      usable += blocks.back().back().matches.size() >= kMinMatches ? 1 : 0;
+      usable += blocks.back().back().matches.size() >= static_cast<size_t>(PairGraph::kMinMatches)
+                    ? 1
+                    : 0;
     }
   }
-  if (has_tracks && usable < 20 && usable * 2 < Joined(report_all).size()) {
+  if (has_tracks && usable < kLeastReportPairs && usable * 2 < Joined(report_all).size()) {
     shares.report = std::move(report_all);
     shares.report_shares_tracks = true;
   }

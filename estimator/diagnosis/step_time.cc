@@ -2,27 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <memory>
-#include <string>
 
 #include "core/effects/catalogue.h"
-#include "core/format.h"
 #include "core/robust_statistics.h"
 #include "estimator/diagnosis/pair_scores.h"
+#include "estimator/diagnosis/thresholds.h"
 
 namespace camgyro {
 namespace {
 
 // The calibration with another shape of its effect number `at`.
-Calibration WithShape(const EffectSetup& setup, Calibration calibration, size_t at,
-                      const std::string& shape) {
+Calibration WithShape(Calibration calibration, size_t at, const ShapedEffect& step) {
   auto set = std::make_shared<EffectSet>();
   const auto& items = calibration.effects->items();
   for (size_t i = 0; i < items.size(); ++i) {
     const auto& item = items[i];
     if (i == at) {
-      set->Add(item.entry, shape, item.entry->make(setup, shape));
+      set->Add(item.entry, step.shape, step.effect);
     } else {
       set->Add(item.entry, item.shape, item.effect);
     }
@@ -43,10 +40,6 @@ struct PairCosts {
 
 }  // namespace
 
-std::string DelayStepShape(double time_s) {
-  return Format("%.4f", std::floor(1e4 * time_s) * 1e-4);
-}
-
 bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
                      const std::vector<TimedPair>& pairs, double reach_s, double noise,
                      const PairGraphOptions& options, Calibration* calibration) {
@@ -55,16 +48,16 @@ bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
   bool moved = false;
   for (size_t k = 0; k < calibration->effects->items().size(); ++k) {
     const auto& item = calibration->effects->items()[k];
-    if (item.entry->name != "delay_step") continue;
-    const double now_s = std::strtod(item.shape.c_str(), nullptr);
+    const std::optional<double> now_s = item.effect->first_stamp_s();
+    if (!now_s || !item.entry->step_at) continue;
     std::vector<double> times_s;  // between two frames each
     for (size_t i = 1; i < setup.frames.size(); ++i) {
       const double time_s = 0.5 * (setup.frames[i - 1].stamp_s + setup.frames[i].stamp_s);
-      if (std::abs(time_s - now_s) <= reach_s) times_s.push_back(time_s);
+      if (std::abs(time_s - *now_s) <= reach_s) times_s.push_back(time_s);
     }
     if (times_s.empty()) continue;
     const auto chi2 = [&](const TimedPair& pair, double step_s) {
-      const Calibration with = WithShape(setup, *calibration, k, DelayStepShape(step_s));
+      const Calibration with = WithShape(*calibration, k, item.entry->step_at(setup, step_s));
       const Scores scores = ComputeScores(input, {{pair}}, with, nullptr, noise, options);
       return scores.pairs.empty() ? 0.0 : scores.pairs.front().chi2;
     };
@@ -88,9 +81,9 @@ bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
         last = i;
       }
     }
-    const std::string shape = DelayStepShape(times_s[(first + last) / 2]);
-    if (shape == item.shape) continue;
-    *calibration = WithShape(setup, std::move(*calibration), k, shape);
+    const ShapedEffect step = item.entry->step_at(setup, times_s[(first + last) / 2]);
+    if (step.shape == item.shape) continue;
+    *calibration = WithShape(std::move(*calibration), k, step);
     moved = true;
   }
   return moved;
@@ -98,10 +91,8 @@ bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
 
 namespace {
 
-constexpr double kScanS = 0.1, kScanStepS = 2e-3;
 constexpr int kScanHalf = static_cast<int>(kScanS / kScanStepS + 0.5);
 constexpr int kDelays = 2 * kScanHalf + 1;
-constexpr size_t kPairsOfBlock = 3;
 
 // A noise for which the minima of chi2 are as wide as the steps of the scan.
 double ScanNoise(const std::vector<PairBlock>& blocks, double noise) {
@@ -138,7 +129,7 @@ std::optional<LargeStep> FindLargeStep(const EstimationInput& input,
   std::vector<BlockCosts> costs;
   for (const PairBlock& block : blocks) {
     BlockCosts cost;
-    const size_t stride = (block.size() + kPairsOfBlock - 1) / kPairsOfBlock;
+    const size_t stride = (block.size() + kScanPairs - 1) / kScanPairs;
     for (size_t i = 0; i < block.size(); i += stride) {
       const auto scores_at = [&](double delay_s) {
         Calibration with = calibration;
@@ -159,7 +150,7 @@ std::optional<LargeStep> FindLargeStep(const EstimationInput& input,
     cost.end_s = block.back().time_b_s;
     costs.push_back(cost);
   }
-  if (costs.size() < 4) return std::nullopt;
+  if (costs.size() < kLeastBlocks) return std::nullopt;
   std::vector<double> misfits;
   for (const BlockCosts& block : costs) misfits.push_back(block.now() / block.residuals);
   std::sort(misfits.begin(), misfits.end());

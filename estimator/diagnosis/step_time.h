@@ -3,7 +3,6 @@
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_STEP_TIME_H_
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "core/calibration.h"
@@ -13,14 +12,10 @@
 
 namespace camgyro {
 
-// Of a delay_step at a time. Rounded down: after the last frame there is no step, and no effect
-// could be made of it.
-std::string DelayStepShape(double time_s);
-
-// Puts every delay_step of a calibration before the frame, of those within `reach_s` of where it
-// is, for which the pairs have the least chi2 with all else held; in the middle of the frames that
-// are equally good (none of the pairs has them). False if nothing has moved.
-// noise: of a pixel [px], of a rotation [rad] for attitudes.
+// Puts every effect that is a step (EffectEntry::step_at) of a calibration before the frame, of
+// those within `reach_s` of where it is, for which the pairs have the least chi2 with all else
+// held; in the middle of the frames that are equally good (none of the pairs has them). False if
+// nothing has moved. noise: of a pixel [px], of a rotation [rad] for attitudes.
 bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
                      const std::vector<TimedPair>& pairs, double reach_s, double noise,
                      const PairGraphOptions& options, Calibration* calibration);

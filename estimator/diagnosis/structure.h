@@ -12,8 +12,12 @@
 
 namespace camgyro {
 
+// Maps that decide about more than whether they show structure.
+enum class MapKind { kOther, kDelayOverTime, kDelayOfFrames, kMisfitOverTime };
+
 // One map: what a piecewise constant change along some axis would be, cell by cell.
 struct StructureMap {
+  MapKind kind = MapKind::kOther;
   std::string name;          // "image", "row", "delay over time", ...
   std::string unit;          // of the values
   std::vector<int> shape;    // cells: {n}, or {rows, columns} of an image; values: x and y in turn
@@ -38,6 +42,13 @@ class StructureMaps {
   std::shared_ptr<EffectSet> set_;
   std::vector<StructureMap> maps_;
 };
+
+// Does a map, one of `maps`, show structure? significance: DiagnoseOptions'.
+bool IsStructure(const StructureMap& map, size_t maps, double significance);
+
+// Does the delay, or the misfit, come and go with time, so that a step of the delay that is beyond
+// the robust loss is worth a scan?
+bool DelayMoves(const std::vector<StructureMap>& maps, double significance);
 
 }  // namespace camgyro
 

@@ -69,7 +69,8 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
   start_bias_ = start.bias_gyro_rad_s;
   turn_sigma_rad_s_ = options_.turn_sigma_rad_s;
   if (start.effects) {
-    turn_sigma_rad_s_ = std::max(turn_sigma_rad_s_, start.effects->turn_sigma_rad_s());
+    turn_sigma_rad_s_ =
+        std::max(turn_sigma_rad_s_, start.effects->widened_sigma(PairLatent::kTurn));
   }
   if (const auto effects = Effects()) {
     num_effects_ = effects->size();

@@ -165,10 +165,10 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
   m.matches.clear();
   const double gap_s = m.frame_b.stamp_s - m.frame_a.stamp_s;
   m.readout_over_gap = calibration.readout_s / gap_s;
-  view->bend_sigma_rad =
-      BendSigma(std::max(options.turn_sigma_rad_s,
-                         calibration.effects ? calibration.effects->turn_sigma_rad_s() : 0.0),
-                calibration.readout_s, gap_s);
+  view->bend_sigma_rad = BendSigma(
+      std::max(options.turn_sigma_rad_s,
+               calibration.effects ? calibration.effects->widened_sigma(PairLatent::kTurn) : 0.0),
+      calibration.readout_s, gap_s);
   m.effects = calibration.pair_effects().set != nullptr ? calibration.effects : nullptr;
   const RotationChain chain(m.rate_times_s, view->rates);
   const ShutterParameters shutter = ShutterOf(calibration);

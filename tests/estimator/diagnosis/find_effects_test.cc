@@ -61,8 +61,8 @@ TEST(FindEffects, IsSilentAndItsPValuesAreUniformOnCleanData) {
       ++all;
     }
   }
-  EXPECT_EQ(all, 5 * 21);
-  EXPECT_LE(small, 14);  // 5 expected; candidates are correlated
+  ASSERT_GT(all, 0);
+  EXPECT_LE(small, 0.13 * all);  // 5 % expected; candidates are correlated
 }
 
 TEST(FindEffects, NamesRadialDistortionAndReportsTheGain) {

@@ -4,6 +4,8 @@
 
 #include <random>
 
+#include "estimator/diagnosis/step_search.h"
+
 namespace camgyro {
 namespace {
 

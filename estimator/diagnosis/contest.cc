@@ -1,0 +1,213 @@
+#include "estimator/diagnosis/contest.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "estimator/diagnosis/gain_rule.h"
+#include "estimator/diagnosis/thresholds.h"
+
+namespace camgyro {
+namespace {
+
+struct Rival {
+  size_t at;  // index into the contestants
+  Refined fit;
+  std::vector<double> gain;  // by block of the choice share
+};
+
+class Contest {
+ public:
+  Contest(const ContestSetting& setting, std::vector<Contestant>* all)
+      : fits_(*setting.fits),
+        now_(*setting.now),
+        choice_(*setting.choice),
+        delay_moves_(setting.delay_moves),
+        noise_(setting.now->quality.noise_px),
+        all_(*all) {
+    const CandidateResult& front = all_.front().result;
+    best_gain_ = front.rejected.empty() ? front.gain.sum : 0.0;
+    astray_ = setting.first_round &&
+              (best_gain_ > kStrongMisfit * Chi2Of(choice_) || fits_.HasRunAway(now_.calibration));
+  }
+
+  std::optional<ContestResult> Run() {
+    for (size_t i = 0; i < all_.size(); ++i) {
+      CandidateResult& r = all_[i].result;
+      const bool in_any_case = TriedInAnyCase(*all_[i].candidate.entry);
+      if (in_any_case && !r.rejected.empty()) {
+        r.tried_anyway = true;
+        r.rejected.clear();
+      }
+      if (!r.rejected.empty()) continue;
+      if (all_[i].candidate.widens_prior()) {
+        RefitWidened(i);
+      } else if (!in_any_case && (static_cast<int>(rivals_.size()) >= fits_.options().max_rivals ||
+                                  r.gain.sum < kLeastGainOfRival * best_gain_)) {
+        r.rejected = "others gain more";
+      } else {
+        RefitRival(i);
+      }
+    }
+    if (rivals_.empty()) return std::nullopt;
+    const size_t winner = Winner();
+    for (size_t i = 0; i < rivals_.size(); ++i) {
+      if (i != winner) all_[rivals_[i].at].result.rejected = "another explains more";
+    }
+    return ContestResult{rivals_[winner].at, std::move(rivals_[winner].fit)};
+  }
+
+ private:
+  // Far from where the model belongs, a linear gain says little: then what throws the plain model
+  // off most is tried in any case, and from where it all began. So is a step of a delay that moves:
+  // where it leaves most matches beyond the loss, their scores scatter, or are nothing.
+  bool TriedInAnyCase(const EffectEntry& entry) const {
+    return (astray_ && entry.leads_astray) || (delay_moves_ && entry.step_at != nullptr);
+  }
+
+  // It frees numbers of every pair, whose gain the likelihood ratio has discounted: that one
+  // stands, not the fall of chi2.
+  void RefitWidened(size_t i) {
+    auto& [r, candidate] = all_[i];
+    Calibration start = now_.calibration;
+    AddEffect(candidate, &start);
+    const Result<Refined> fit = fits_.Fit(start, noise_);
+    if (!fit) return;
+    r.rejected = Implausible(fit->calibration, fits_.in().start.lens[kFocal]);
+    if (!r.rejected.empty()) return;
+    r.refitted = true;
+    rivals_.push_back({i, *fit, LatentGain(choice_)});
+  }
+
+  // The better of a fit from the present one and, where the model is astray, one from the start.
+  Result<Refined> FitWith(const CandidateResult& r, const Candidate& candidate) const {
+    Calibration start = now_.calibration;
+    AddEffect(candidate, &start);
+    const int columns = candidate.effect->size();
+    if (r.start.size() == columns) start.effect_values.tail(columns) = r.start;
+    start.delay_s += r.start_delay_change_s;
+    Result<Refined> fit = fits_.Fit(start, noise_);
+    if (!astray_) return fit;
+    Calibration anew = fits_.in().start;
+    AddEffect(candidate, &anew);
+    const Result<Refined> other = fits_.Fit(anew, fits_.in().noise);
+    const auto rank = [&](const Refined& f) {
+      return std::pair(!Implausible(f.calibration, fits_.in().start.lens[kFocal]).empty(),
+                       f.quality.rms_px);
+    };
+    if (other && (!fit || rank(*other) < rank(*fit))) fit = other;
+    return fit;
+  }
+
+  void RefitRival(size_t i) {
+    auto& [r, candidate] = all_[i];
+    Result<Refined> fit = FitWith(r, candidate);
+    if (fit && candidate.entry->step_at && fits_.PlaceSteps(noise_, &fit->calibration)) {
+      r.shape = fit->calibration.effects->items().back().shape;
+      fit = fits_.Fit(fit->calibration, noise_);
+    }
+    if (!fit) {
+      r.rejected = "the fit with it failed: " + fit.error().message;
+      return;
+    }
+    fit = fits_.Settle(*std::move(fit));
+    r.refitted = true;
+    const Scores with = fits_.ScoresOf(fits_.shares().choice, fit->calibration, nullptr, noise_);
+    Rival rival{i, *fit, Fall(choice_, with)};
+    r.gain = SumOf(rival.gain);
+    const EffectSet::Item& item = fit->calibration.effects->items().back();
+    r.estimate = fit->calibration.effect_values.segment(item.first, item.effect->size());
+    r.sigma = fit->calibration.effect_covariance.diagonal()
+                  .segment(item.first, item.effect->size())
+                  .cwiseSqrt();
+    r.rejected = WhyNot(r, fit->calibration);
+    if (r.rejected.empty()) rivals_.push_back(std::move(rival));
+  }
+
+  // Empty: nothing speaks against it.
+  std::string WhyNot(const CandidateResult& r, const Calibration& fit) const {
+    std::string implausible = Implausible(fit, fits_.in().start.lens[kFocal]);
+    if (!implausible.empty()) return implausible;
+    if (!GainBearsOut(r, static_cast<double>(all_.size()))) {
+      return "no gain on unseen frames beyond its noise";
+    }
+    // One that its score does not name is corrected for what could have been tried in its place:
+    // a step in every stretch.
+    const size_t stretches = fits_.shares().fit.size() + fits_.shares().choice.size();
+    const double chances = r.tried_anyway ? static_cast<double>(all_.size() * stretches) : 1.0;
+    if (chances * PValueOfFit(fit, r.inflation, r.gain.sum) > fits_.options().significance) {
+      return "not significant once fitted";
+    }
+    return "";
+  }
+
+  // Of the rivals: the largest gain, or one with fewer parameters that is no worse beyond the noise
+  // of the difference.
+  size_t Winner() const {
+    const auto gain_of = [&](const Rival& rival) { return all_[rival.at].result.gain.sum; };
+    const auto size_of = [&](const Rival& rival) { return all_[rival.at].candidate.complexity(); };
+    size_t winner = 0;
+    for (size_t i = 1; i < rivals_.size(); ++i) {
+      if (gain_of(rivals_[i]) > gain_of(rivals_[winner])) winner = i;
+    }
+    for (size_t i = 0; i < rivals_.size(); ++i) {
+      if (size_of(rivals_[i]) >= size_of(rivals_[winner]) ||
+          rivals_[i].gain.size() != rivals_[winner].gain.size()) {
+        continue;
+      }
+      std::vector<double> difference;
+      for (size_t b = 0; b < rivals_[i].gain.size(); ++b) {
+        difference.push_back(rivals_[winner].gain[b] - rivals_[i].gain[b]);
+      }
+      const Gain behind = SumOf(difference);
+      if (behind.sum < kBehindSigmas * behind.sigma) winner = i;
+    }
+    return winner;
+  }
+
+  const SharedFits& fits_;
+  const Refined& now_;
+  const Scores& choice_;
+  const bool delay_moves_;
+  const double noise_;
+  std::vector<Contestant>& all_;
+  double best_gain_ = 0.0;
+  bool astray_ = false;
+  std::vector<Rival> rivals_;
+};
+
+}  // namespace
+
+std::optional<ContestResult> RunContest(const ContestSetting& setting,
+                                        std::vector<Contestant>* contestants) {
+  if (contestants->empty()) return std::nullopt;
+  return Contest(setting, contestants).Run();
+}
+
+std::string Implausible(const Calibration& fit, double start_focal_px) {
+  const EffectSet::Item& item = fit.effects->items().back();
+  for (int k = 0; k < item.effect->size(); ++k) {
+    const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+    const double value = fit.effect_values[item.first + k];
+    const double sigma = std::sqrt(fit.effect_covariance(item.first + k, item.first + k));
+    if (value < p.plausible_min - kImplausibleSigmas * sigma ||
+        value > p.plausible_max + kImplausibleSigmas * sigma) {
+      return p.name + " outside of what real devices show";
+    }
+  }
+  if (std::abs(std::log(fit.lens[kFocal] / start_focal_px)) > std::log(kRunAwayFocal)) {
+    return "the fit runs away with it";
+  }
+  return "";
+}
+
+double PValueOfFit(const Calibration& fit, double inflation, double gain) {
+  const EffectSet::Item& item = fit.effects->items().back();
+  const int n = item.effect->size();
+  const Eigen::VectorXd value = fit.effect_values.segment(item.first, n);
+  const Eigen::MatrixXd covariance = fit.effect_covariance.block(item.first, item.first, n, n);
+  const double statistic = value.dot(covariance.completeOrthogonalDecomposition().solve(value));
+  return ChiSquareTail((statistic + std::max(0.0, gain)) / std::max(1.0, inflation), 2 * n);
+}
+
+}  // namespace camgyro

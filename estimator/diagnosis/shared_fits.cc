@@ -1,0 +1,101 @@
+#include "estimator/diagnosis/shared_fits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "estimator/diagnosis/step_time.h"
+#include "estimator/diagnosis/thresholds.h"
+
+namespace camgyro {
+
+SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
+    : in_(in),
+      options_(options),
+      input_(MakeEstimationInput(*in.recording, SelectPairs(*in.recording))),
+      shares_(MakeShares(*in.recording, input_)) {
+  const PairSelection near = SelectPairs(*in.recording, kNearGap);
+  map_pairs_ = MakeShares(*in.recording, MakeEstimationInput(*in.recording, near)).choice;
+  Thin(kMostFitPairs, &shares_.fit);
+  Thin(kMostChoicePairs, &shares_.choice);
+  Thin(kMostChoicePairs, &map_pairs_);
+}
+
+void SharedFits::Thin(size_t most, std::vector<PairBlock>* blocks) const {
+  const size_t stride = (Joined(*blocks).size() + most - 1) / most;
+  if (stride < 2 || in_.recording->HasOnlyAttitudes()) return;
+  size_t at = 0;
+  for (PairBlock& block : *blocks) {
+    PairBlock kept;
+    for (TimedPair& pair : block) {
+      if (at++ % stride == 0) kept.push_back(std::move(pair));
+    }
+    block = std::move(kept);
+  }
+}
+
+std::vector<PairBlock> SharedFits::SeenBlocks() const {
+  std::vector<PairBlock> blocks;
+  for (const auto* share : {&shares_.fit, &shares_.choice}) {
+    std::copy_if(share->begin(), share->end(), std::back_inserter(blocks),
+                 [](const PairBlock& block) { return !block.empty(); });
+  }
+  std::sort(blocks.begin(), blocks.end(), [](const PairBlock& a, const PairBlock& b) {
+    return a.front().time_a_s < b.front().time_a_s;
+  });
+  return blocks;
+}
+
+Result<Refined> SharedFits::Fit(const Calibration& start, double noise) const {
+  RefinementOptions refinement = options_.calibrate.refinement;
+  refinement.graph = in_.graph;
+  refinement.graph.sigma_px = noise;
+  refinement.sigma_rad = noise;
+  refinement.cluster_s = shares_.block_s;
+  refinement.max_rounds = kFitRounds;
+  return Refine(input_, Joined(shares_.fit), start, in_.prior, refinement);
+}
+
+Refined SharedFits::Settle(Refined fit) const {
+  return SettleEffects(*in_.recording, std::move(fit),
+                       [this](const Calibration& from, double noise) { return Fit(from, noise); });
+}
+
+bool SharedFits::PlaceSteps(double noise, Calibration* calibration) const {
+  std::vector<TimedPair> pairs = Joined(shares_.fit);
+  const std::vector<TimedPair> choice = Joined(shares_.choice);
+  pairs.insert(pairs.end(), choice.begin(), choice.end());
+  return PlaceDelaySteps(*in_.recording, input_, pairs, kStepMarginBlocks * shares_.block_s, noise,
+                         in_.graph, calibration);
+}
+
+Scores SharedFits::ScoresOf(const std::vector<PairBlock>& blocks, const Calibration& calibration,
+                            std::shared_ptr<const EffectSet> candidates, double noise) const {
+  return ComputeScores(input_, blocks, calibration, std::move(candidates), noise, in_.graph);
+}
+
+bool SharedFits::HasRunAway(const Calibration& c) const {
+  const LensParameters& start = in_.start.lens;
+  return std::abs(c.lens[kFocal] / start[kFocal] - 1.0) > kAstrayFocal ||
+         std::hypot(c.lens[kCx] - start[kCx], c.lens[kCy] - start[kCy]) >
+             kAstrayCentre * std::hypot(c.width_px, c.height_px);
+}
+
+double Chi2Of(const Scores& scores) {
+  double chi2 = 0.0;
+  for (const BlockScore& block : scores.blocks) chi2 += block.chi2;
+  return chi2;
+}
+
+std::vector<double> Fall(const Scores& before, const Scores& after) {
+  std::vector<double> fall;
+  for (const BlockScore& b : before.blocks) {
+    for (const BlockScore& a : after.blocks) {
+      if (a.time_s == b.time_s && a.pairs == b.pairs) fall.push_back(b.chi2 - a.chi2);
+    }
+  }
+  return fall;
+}
+
+}  // namespace camgyro

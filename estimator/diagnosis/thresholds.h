@@ -1,0 +1,108 @@
+// Every number by which the diagnosis decides something, with its unit and where it comes from.
+// (Rules on the recording itself, before any fit, are with data_faults.)
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_THRESHOLDS_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_THRESHOLDS_H_
+
+#include <cstddef>
+
+namespace camgyro {
+
+// ---- The shares of a recording (shares.cc; tests/diagnosis/shares_test.cc) ----
+
+// A stretch is this part of the recording, within these limits [s], and has at least so many
+// frames: short enough that what changes with time is seen by all shares, long enough for pairs.
+constexpr double kBlocksPerRecording = 40.0;
+constexpr double kShortestBlockS = 0.2, kLongestBlockS = 3.0;
+constexpr double kLeastFramesOfBlock = 6.0;
+// Pairs of the report share that have matches of their own tracks, below which it shares tracks.
+constexpr size_t kLeastReportPairs = 20;
+
+// ---- What the loop needs and spends (shared_fits.cc, find_effects.cc) ----
+
+// Below, the scatter between stretches says nothing and a fit stands on too few pairs
+// (FindEffects.SaysIfThereIsTooLittleToTest).
+constexpr size_t kLeastBlocks = 4;
+constexpr int kLeastFitPairs = 25, kLeastChoicePairs = 25;
+// Of recordings with pixels. A fit needs no more to tell effects apart: what it gets wrong within
+// its noise is projected out of the test. Time is spent on the refits.
+constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
+// Of the maps [frames]: what comes and goes within some frames is to be seen
+// (FindEffects.LeavesAPeriodicGlitchWithoutAName).
+constexpr int kNearGap = 3;
+// Rounds of noise scale and solve in a share's fit; its estimate need not settle to the last digit.
+constexpr int kFitRounds = 4;
+// Of the robust loss where nothing of the recording is known yet: attitudes [rad], pixels [px].
+constexpr double kFirstNoiseRad = 2e-3, kFirstNoisePx = 1.0;
+
+// ---- Significance (score_test.cc, step_search.cc; tests/diagnosis/score_test_test.cc) ----
+
+// Information of a direction over that of the prior, below which it is not tested.
+constexpr double kLeastInformation = 1.0;
+// Degrees of freedom that the scatter of all candidates together is worth at most, since their
+// tests are not independent.
+constexpr double kMostScatterDof = 50.0;
+// Prior of a step of the delay [s]: as its effect's plausible range, a quarter of it.
+constexpr double kStepPriorS = 0.05;
+// A step is searched this many stretches away from either end, and placed within as many.
+constexpr double kStepMarginBlocks = 1.5;
+
+// ---- Gain on unseen frames (gain_rule.cc; tests/diagnosis/gain_rule_test.cc) ----
+
+constexpr double kNoDoubt = 1e-5;       // p of all candidates together
+constexpr double kNoiseAlone = 2.0;     // inflation below which the noise is the model's
+constexpr double kGainSigmas = 2.0;     // beyond its scatter, or the noise of a right effect's gain
+constexpr double kHardlyAnyLoss = 0.1;  // of the gain, lost in the stretches that become worse
+
+// ---- The contest of refitted rivals (contest.cc; docs/diagnosis_simulated.md) ----
+
+// Rivals with less of the best one's linear gain are not refitted.
+constexpr double kLeastGainOfRival = 0.25;
+// A linear gain of one effect over chi2, beyond which the model is so far off that it says little
+// (FindEffects.ChoosesTheSeriesOfAWideLens).
+constexpr double kStrongMisfit = 0.02;
+// One with fewer parameters wins if it is behind by less than so many sigmas of the difference.
+constexpr double kBehindSigmas = 2.0;
+// Beyond the range of real devices by more than so many of its sigmas, a fit is not believed.
+constexpr double kImplausibleSigmas = 2.0;
+// Factor of the focal length beyond which a fit runs away with an effect
+// (FindEffects.NamesNothingWithAFocalLengthThatRanAway).
+constexpr double kRunAwayFocal = 2.0;
+// The plain fit is astray: its focal length has changed by this part, its centre by this part of
+// the diagonal. (Real centres stay within 3 % of the diagonal.)
+constexpr double kAstrayFocal = 0.15, kAstrayCentre = 0.05;
+
+// ---- A large step of the delay (step_time.cc; FindEffects.NamesAStepThatIsBeyondTheLoss) ----
+
+constexpr double kScanS = 0.1, kScanStepS = 2e-3;  // delays tried: to both sides, and how far apart
+constexpr size_t kScanPairs = 3;                   // of each stretch
+constexpr double kGoodPart = 0.3;  // of the misfit that comes and goes, which a step explains
+
+// ---- Structure without a name (structure.cc) ----
+
+// p of all maps together, as a part of DiagnoseOptions::significance: maps are many, and what they
+// say is no more than that something is left (docs/diagnosis_simulated.md, clean recordings).
+constexpr double kStructureSignificance = 0.1;
+// Noise changes with what is seen: stretches misfit by up to 3.5 times those that fit well where
+// nothing else is wrong (iphone-cards); wrong by more than the loss is 8.
+constexpr double kLeastMisfit = 4.0;
+// Wrong matches come in flocks: variance of a stretch's chi2 over that of independent matches.
+constexpr double kOverdispersion = 4.0;
+// The scatter of the delay from pair to pair depends on the noise model to some percent: it must be
+// larger by half, and without doubt.
+constexpr double kLeastFrameScatter = 1.5, kFrameScatterP = 1e-6;
+// A misfit that comes and goes with time, for which a scan for a step of the delay and a refit are
+// spent: a walk loses less to the loss than a run.
+constexpr double kMisfitToScan = 2.0, kMisfitToScanP = 1e-3;
+
+// ---- What the verdict says beside effects ----
+
+// Canonical correlation of two effects beyond which this motion cannot tell them apart, and how
+// many more parameters one may have: a flexible curve contains simpler effects (candidates.cc).
+constexpr double kAliasLimit = 0.95;
+constexpr size_t kAliasFactor = 3, kAliasMore = 3;
+// Sigmas by which a readout time is negative before rows are said to be read from bottom to top.
+constexpr double kReversedSigmas = 5.0;
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_THRESHOLDS_H_
