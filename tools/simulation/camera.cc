@@ -16,7 +16,7 @@ constexpr double kHighPassStep = 1e-3;   // [s]; the Hermite interpolant errs by
 constexpr double kHighPassStart = -1.0;  // [s]
 
 // Kannala & Brandt 2006, odd polynomial of the angle from the axis, as OpenCV's fisheye.
-double KannalaBrandt(double angle, const Effects::Lens& k, double* slope) {
+double KannalaBrandt(double angle, const RadialDistortion& k, double* slope) {
   const double a2 = angle * angle;
   *slope = 1.0 + a2 * (3.0 * k.k1 + a2 * (5.0 * k.k2 + a2 * (7.0 * k.k3 + a2 * 9.0 * k.k4)));
   return angle * (1.0 + a2 * (k.k1 + a2 * (k.k2 + a2 * (k.k3 + a2 * k.k4))));
@@ -57,9 +57,10 @@ SimulatedCamera::SimulatedCamera(const Scenario& scenario,
 }
 
 double SimulatedCamera::Focal(double time_s) const {
-  const Effects::FocalDrift& drift = scenario_.effects.focal_drift;
-  return lens_[kFocal] + drift.rate_px_s * time_s +
-         drift.breathing_px * std::sin(2.0 * M_PI * time_s / drift.period_s);
+  double focal_px = lens_[kFocal];
+  scenario_.effects.ForEach(
+      [&](const auto& effect) { CallAddFocal(effect, time_s, &focal_px, 0); });
+  return focal_px;
 }
 
 // The lens group moves against the rotation: a turn by +theta_y moves the picture by -f theta_y in
@@ -115,20 +116,15 @@ FrameTiming SimulatedCamera::MakeFrame(double stamp_s, double exposure_s) const 
 }
 
 double SimulatedCamera::Delay(const FrameTiming& frame) const {
-  const Effects& effects = scenario_.effects;
-  const double time_s = frame.stamp_s + scenario_.camera.delay_s;
-  double delay_s = scenario_.camera.delay_s + 1e-6 * effects.clock_skew.ppm * time_s +
-                   effects.exposure_delay.factor * frame.exposure_s;
-  if (time_s >= effects.delay_step.time_s) delay_s += effects.delay_step.step_s;
-  // Two incommensurable periods: neither a line nor a single tone.
-  const Effects::DelayWander& wander = effects.delay_wander;
-  const double turn = 2.0 * M_PI * time_s / wander.period_s;
-  return delay_s + wander.amplitude_s * (0.7 * std::sin(turn) + 0.3 * std::sin(1.618 * turn + 1.0));
+  double delay_s = scenario_.camera.delay_s;
+  const FrameClock clock = {frame.stamp_s + delay_s, frame.exposure_s};
+  scenario_.effects.ForEach([&](const auto& effect) { CallAddDelay(effect, clock, &delay_s, 0); });
+  return delay_s;
 }
 
 double SimulatedCamera::ExposureTime(const FrameTiming& frame, const Vector2d& px) const {
   const CameraOptions& camera = scenario_.camera;
-  const Effects::ReadoutDirection& direction = scenario_.effects.readout_direction;
+  const ReadoutDirection& direction = scenario_.effects.readout_direction;
   const double s = direction.columns ? px.x() / camera.width_px : px.y() / camera.height_px;
   const double curved = s + 4.0 * scenario_.effects.readout_nonlinear.curve * s * (1.0 - s);
   const double readout_s = direction.reversed ? -camera.readout_s : camera.readout_s;
@@ -137,7 +133,7 @@ double SimulatedCamera::ExposureTime(const FrameTiming& frame, const Vector2d& p
 
 Eigen::RowVector2d SimulatedCamera::ExposureSlope(const Vector2d& px) const {
   const CameraOptions& camera = scenario_.camera;
-  const Effects::ReadoutDirection& direction = scenario_.effects.readout_direction;
+  const ReadoutDirection& direction = scenario_.effects.readout_direction;
   const double s = direction.columns ? px.x() / camera.width_px : px.y() / camera.height_px;
   const double readout_s = direction.reversed ? -camera.readout_s : camera.readout_s;
   const double slope =
@@ -148,7 +144,7 @@ Eigen::RowVector2d SimulatedCamera::ExposureSlope(const Vector2d& px) const {
 
 std::optional<Vector2d> SimulatedCamera::Project(const Vector3d& point_cam, double time_s) const {
   const LensParameters lens = LensAt(time_s);
-  const Effects::Lens& distortion = scenario_.effects.radial_distortion;
+  const RadialDistortion& distortion = scenario_.effects.radial_distortion;
   if (!distortion.kannala_brandt) {
     return GetLens(DistortionModel::kRadTan).Project(point_cam, lens);
   }
@@ -164,7 +160,7 @@ std::optional<Vector2d> SimulatedCamera::Project(const Vector3d& point_cam, doub
 
 std::optional<Vector3d> SimulatedCamera::Unproject(const Vector2d& px, double time_s) const {
   const LensParameters lens = LensAt(time_s);
-  const Effects::Lens& distortion = scenario_.effects.radial_distortion;
+  const RadialDistortion& distortion = scenario_.effects.radial_distortion;
   if (!distortion.kannala_brandt) {
     RayJet jet;
     if (!GetLens(DistortionModel::kRadTan).Unproject(px, lens, &jet)) return std::nullopt;

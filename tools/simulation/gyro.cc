@@ -69,6 +69,18 @@ class Normal {
   std::normal_distribution<double> normal_;
 };
 
+// What an accelerometer at the gyro feels, in the gyro frame [m/s^2].
+Vector3d SpecificForce(const Scenario& scenario, const Trajectory& trajectory, double time_s) {
+  const Matrix3d R_gyro_cam = scenario.mount.q_gyro_cam.toRotationMatrix();
+  const Vector3d gravity_world(0.0, 9.80665, 0.0);
+  const CameraState state = trajectory.At(time_s);
+  const Vector3d omega = R_gyro_cam * state.omega_cam_rad_s;
+  const Vector3d alpha = R_gyro_cam * state.alpha_cam_rad_s2;
+  const Vector3d& arm = scenario.mount.p_gyro_cam_m;  // from the IMU to the camera
+  return R_gyro_cam * (state.R_world_cam.transpose() * (state.a_world_m_s2 - gravity_world)) -
+         alpha.cross(arm) - omega.cross(omega.cross(arm));
+}
+
 }  // namespace
 
 SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajectory,
@@ -81,13 +93,7 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
                      1;
 
   Matrix3d M = Matrix3d::Identity();
-  M.diagonal() += effects.gyro_scale.error;
-  M(0, 1) = M(1, 0) = effects.gyro_misalignment.xy;
-  M(0, 2) = M(2, 0) = effects.gyro_misalignment.xz;
-  M(1, 2) = M(2, 1) = effects.gyro_misalignment.yz;
-  const Matrix3d R_gyro_cam = scenario.mount.q_gyro_cam.toRotationMatrix();
-  const Vector3d gravity_world(0.0, 9.80665, 0.0);
-
+  effects.ForEach([&](const auto& effect) { CallAddRateMatrix(effect, &M, 0); });
   const double sigma_rate = options.noise_density_rad_s_rtHz * std::sqrt(options.rate_hz);
   const double sigma_accel = options.accel_noise_density_m_s2_rtHz * std::sqrt(options.rate_hz);
   const double sigma_walk = options.bias_walk_rad_s2_rtHz * std::sqrt(dt);
@@ -100,10 +106,9 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
   for (int64_t i = 0; i < count; ++i) {
     const int64_t sampled_ns = StampAt(scenario.start_ns, static_cast<double>(i) * dt);
     const double time_s = SecondsSince(scenario.start_ns, sampled_ns);
-    const double swing = std::sin(2.0 * M_PI * time_s / effects.bias_drift.period_s);
-    result.bias_rad_s.push_back(options.bias_rad_s + walk +
-                                effects.bias_drift.rate_rad_s2 * time_s +
-                                effects.bias_drift.swing_rad_s * swing);
+    Vector3d bias = options.bias_rad_s + walk;
+    effects.ForEach([&](const auto& effect) { CallAddBias(effect, time_s, &bias, 0); });
+    result.bias_rad_s.push_back(bias);
     walk += sigma_walk * normal.Vector();
 
     Vector3d rate = Vector3d::Zero();
@@ -115,7 +120,9 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
     } else {
       rate = element.At(time_s);
     }
-    rate = M * rate + result.bias_rad_s.back() + sigma_rate * normal.Vector();
+    rate = M * rate + bias + sigma_rate * normal.Vector();
+    const RateInput input = {time_s, SpecificForce(scenario, trajectory, time_s)};
+    effects.ForEach([&](const auto& effect) { CallAddRate(effect, input, &rate, 0); });
     const double limit = effects.gyro_saturation.limit_rad_s;
     if (limit > 0.0) rate = rate.cwiseMax(-limit).cwiseMin(limit);
     if (options.quantum_rad_s > 0.0) {
@@ -132,14 +139,7 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
     if (!result.gyro.empty()) stamp_ns = std::max(stamp_ns, result.gyro.back().stamp_ns + 1000);
     result.gyro.push_back({stamp_ns, rate});
     if (options.accelerometer) {
-      const CameraState state = trajectory.At(time_s);
-      const Vector3d omega = R_gyro_cam * state.omega_cam_rad_s;
-      const Vector3d alpha = R_gyro_cam * state.alpha_cam_rad_s2;
-      const Vector3d& arm = scenario.mount.p_gyro_cam_m;  // from the IMU to the camera
-      const Vector3d force =
-          R_gyro_cam * (state.R_world_cam.transpose() * (state.a_world_m_s2 - gravity_world)) -
-          alpha.cross(arm) - omega.cross(omega.cross(arm));
-      result.accel.push_back({stamp_ns, force + accel_noise});
+      result.accel.push_back({stamp_ns, input.force_m_s2 + accel_noise});
     }
   }
   return result;

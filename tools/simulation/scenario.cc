@@ -136,95 +136,17 @@ void Read(YamlSection section, VideoOptions* video) {
   section.Finish();
 }
 
-void ReadLensEffects(YamlSection* section, Effects* effects) {
-  YamlSection radial = section->Child("radial_distortion");
-  radial.Read("model", &effects->radial_distortion.kannala_brandt,
-              {{"radtan", false}, {"kb4", true}});
-  radial.Read("k1", &effects->radial_distortion.k1);
-  radial.Read("k2", &effects->radial_distortion.k2);
-  radial.Read("k3", &effects->radial_distortion.k3);
-  radial.Read("k4", &effects->radial_distortion.k4);
-  radial.Finish();
-  YamlSection tangential = section->Child("tangential_distortion");
-  tangential.Read("p1", &effects->tangential_distortion.p1);
-  tangential.Read("p2", &effects->tangential_distortion.p2);
-  tangential.Finish();
-  const Effects::Lens& lens = effects->radial_distortion;
-  if (!lens.kannala_brandt && (lens.k3 != 0.0 || lens.k4 != 0.0)) {
-    radial.Complain({}, "k3", "and k4 belong to model kb4");
+void Read(YamlSection section, Effects* effects) {
+  effects->ForEach([&](auto& effect) {
+    YamlSection keys = section.Child(effect.kName);
+    effect.Read(&keys);
+    keys.Finish();
+  });
+  section.Finish();
+  const TangentialDistortion& tangential = effects->tangential_distortion;
+  if (effects->radial_distortion.kannala_brandt && tangential.active()) {
+    section.Complain({}, "tangential_distortion.p1", "and p2 belong to model radtan");
   }
-  if (lens.kannala_brandt &&
-      (effects->tangential_distortion.p1 != 0.0 || effects->tangential_distortion.p2 != 0.0)) {
-    tangential.Complain({}, "p1", "and p2 belong to model radtan");
-  }
-  YamlSection aspect = section->Child("aspect_ratio");
-  aspect.Read("ratio", &effects->aspect_ratio.ratio, Range::kPositive);
-  aspect.Finish();
-  YamlSection drift = section->Child("focal_drift");
-  drift.Read("rate_px_s", &effects->focal_drift.rate_px_s);
-  drift.Read("breathing_px", &effects->focal_drift.breathing_px);
-  drift.Read("period_s", &effects->focal_drift.period_s, Range::kPositive);
-  drift.Finish();
-  YamlSection optical = section->Child("optical_stabilisation");
-  optical.Read("gain", &effects->optical_stabilisation.gain);
-  optical.Read("corner_hz", &effects->optical_stabilisation.corner_hz, Range::kPositive);
-  optical.Finish();
-  YamlSection electronic = section->Child("electronic_stabilisation");
-  electronic.Read("strength", &effects->electronic_stabilisation.strength, Range::kFraction);
-  electronic.Read("smoothing_s", &effects->electronic_stabilisation.smoothing_s, Range::kPositive);
-  electronic.Finish();
-}
-
-void ReadClockEffects(YamlSection* section, Effects* effects) {
-  YamlSection skew = section->Child("clock_skew");
-  skew.Read("ppm", &effects->clock_skew.ppm);
-  skew.Finish();
-  YamlSection step = section->Child("delay_step");
-  step.Read("time_s", &effects->delay_step.time_s);
-  step.Read("step_s", &effects->delay_step.step_s);
-  step.Finish();
-  YamlSection wander = section->Child("delay_wander");
-  wander.Read("amplitude_s", &effects->delay_wander.amplitude_s);
-  wander.Read("period_s", &effects->delay_wander.period_s, Range::kPositive);
-  wander.Finish();
-  YamlSection direction = section->Child("readout_direction");
-  direction.Read("reversed", &effects->readout_direction.reversed);
-  direction.Read("columns", &effects->readout_direction.columns);
-  direction.Finish();
-  YamlSection nonlinear = section->Child("readout_nonlinear");
-  nonlinear.Read("curve", &effects->readout_nonlinear.curve);
-  if (std::abs(effects->readout_nonlinear.curve) >= 0.25) {
-    nonlinear.Complain({}, "curve", "must lie between -0.25 and 0.25: rows are read in order");
-  }
-  nonlinear.Finish();
-  YamlSection exposure = section->Child("exposure_delay");
-  exposure.Read("factor", &effects->exposure_delay.factor);
-  exposure.Finish();
-}
-
-void ReadRateEffects(YamlSection* section, Effects* effects) {
-  YamlSection scale = section->Child("gyro_scale");
-  scale.Read("error", &effects->gyro_scale.error);
-  scale.Finish();
-  YamlSection misalignment = section->Child("gyro_misalignment");
-  misalignment.Read("xy", &effects->gyro_misalignment.xy);
-  misalignment.Read("xz", &effects->gyro_misalignment.xz);
-  misalignment.Read("yz", &effects->gyro_misalignment.yz);
-  misalignment.Finish();
-  YamlSection lowpass = section->Child("gyro_lowpass");
-  lowpass.Read("time_constant_s", &effects->gyro_lowpass.time_constant_s, Range::kNotNegative);
-  lowpass.Finish();
-  YamlSection saturation = section->Child("gyro_saturation");
-  saturation.Read("limit_rad_s", &effects->gyro_saturation.limit_rad_s, Range::kNotNegative);
-  saturation.Finish();
-  YamlSection drift = section->Child("bias_drift");
-  drift.Read("rate_rad_s2", &effects->bias_drift.rate_rad_s2);
-  drift.Read("swing_rad_s", &effects->bias_drift.swing_rad_s);
-  drift.Read("period_s", &effects->bias_drift.period_s, Range::kPositive);
-  drift.Finish();
-  YamlSection acceleration = section->Child("translation_acceleration");
-  acceleration.Read("shake_m_s", &effects->translation_acceleration.shake_m_s, Range::kNotNegative);
-  acceleration.Finish();
 }
 
 std::string CheckTogether(const Scenario& scenario) {
@@ -346,11 +268,7 @@ Result<Scenario> ParseScenario(const std::string& yaml, const std::vector<std::s
     Read(file.Child("gyro"), &scenario.gyro);
     Read(file.Child("tracks"), &scenario.tracks);
     Read(file.Child("video"), &scenario.video);
-    YamlSection effects = file.Child("effects");
-    ReadLensEffects(&effects, &scenario.effects);
-    ReadClockEffects(&effects, &scenario.effects);
-    ReadRateEffects(&effects, &scenario.effects);
-    effects.Finish();
+    Read(file.Child("effects"), &scenario.effects);
     file.Finish();
   } catch (const YAML::Exception& error) {
     complaint = "line " + std::to_string(error.mark.line + 1) + ": " + error.msg;
@@ -378,35 +296,11 @@ Result<Scenario> LoadScenario(const std::string& path, const std::vector<std::st
   return scenario;
 }
 
-std::vector<std::string> ActiveEffects(const Effects& e) {
-  const Effects::Lens& radial = e.radial_distortion;
-  const std::vector<std::pair<std::string, bool>> all = {
-      {"radial_distortion", radial.kannala_brandt || radial.k1 != 0.0 || radial.k2 != 0.0},
-      {"tangential_distortion",
-       e.tangential_distortion.p1 != 0.0 || e.tangential_distortion.p2 != 0.0},
-      {"aspect_ratio", e.aspect_ratio.ratio != 1.0},
-      {"focal_drift", e.focal_drift.rate_px_s != 0.0 || e.focal_drift.breathing_px != 0.0},
-      {"optical_stabilisation", e.optical_stabilisation.gain != 0.0},
-      {"clock_skew", e.clock_skew.ppm != 0.0},
-      {"delay_step", e.delay_step.step_s != 0.0},
-      {"delay_wander", e.delay_wander.amplitude_s != 0.0},
-      {"readout_direction", e.readout_direction.reversed || e.readout_direction.columns},
-      {"readout_nonlinear", e.readout_nonlinear.curve != 0.0},
-      {"gyro_scale", !e.gyro_scale.error.isZero(0.0)},
-      {"gyro_misalignment", e.gyro_misalignment.xy != 0.0 || e.gyro_misalignment.xz != 0.0 ||
-                                e.gyro_misalignment.yz != 0.0},
-      {"gyro_lowpass", e.gyro_lowpass.time_constant_s > 0.0},
-      {"gyro_saturation", e.gyro_saturation.limit_rad_s > 0.0},
-      {"bias_drift",
-       !e.bias_drift.rate_rad_s2.isZero(0.0) || !e.bias_drift.swing_rad_s.isZero(0.0)},
-      {"exposure_delay", e.exposure_delay.factor != 0.0},
-      {"translation_acceleration", e.translation_acceleration.shake_m_s > 0.0},
-      {"electronic_stabilisation", e.electronic_stabilisation.strength != 0.0},
-  };
+std::vector<std::string> ActiveEffects(const Effects& effects) {
   std::vector<std::string> names;
-  for (const auto& [name, active] : all) {
-    if (active) names.push_back(name);
-  }
+  effects.ForEach([&](const auto& effect) {
+    if (effect.active()) names.emplace_back(effect.kName);
+  });
   return names;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "tools/simulation/effects/all_effects.h"
 
 namespace camgyro::simulation {
 
@@ -117,71 +118,6 @@ struct VideoOptions {
   double full_well_electrons = 8000.0;      // photon noise; 0: none
   double read_noise_electrons = 6.0;
   int crf = 18;  // H.264 quality, 0 (lossless) to 51
-};
-
-// The catalogue (docs/effects.md), all absent by default. Causes and realistic sizes of each
-// are in docs/simulate.md. Times t are seconds after the first gyro stamp, on the gyro clock.
-struct Effects {
-  struct Lens {
-    double k1 = 0.0, k2 = 0.0, k3 = 0.0, k4 = 0.0;  // k3, k4: Kannala-Brandt only
-    bool kannala_brandt = false;
-  } radial_distortion;
-  struct Tangential {
-    double p1 = 0.0, p2 = 0.0;
-  } tangential_distortion;
-  struct Aspect {
-    double ratio = 1.0;  // fx / fy
-  } aspect_ratio;
-  struct FocalDrift {  // f(t) = f + rate t + breathing sin(2 pi t / period)
-    double rate_px_s = 0.0, breathing_px = 0.0, period_s = 8.0;
-  } focal_drift;
-  struct OpticalStabilisation {
-    double gain = 0.0;  // 1: the whole high-passed rotation is taken out
-    double corner_hz = 0.5;
-  } optical_stabilisation;
-  struct ClockSkew {
-    double ppm = 0.0;  // t_d grows by this much per second of t
-  } clock_skew;
-  struct DelayStep {
-    double time_s = 0.0, step_s = 0.0;
-  } delay_step;
-  struct DelayWander {
-    double amplitude_s = 0.0, period_s = 7.0;
-  } delay_wander;
-  struct ReadoutDirection {
-    bool reversed = false;  // t_r changes its sign
-    bool columns = false;   // reads column after column, left to right: t_r u / w
-  } readout_direction;
-  struct ReadoutNonlinear {
-    double curve = 0.0;  // s = v / h becomes s + 4 curve s (1 - s)
-  } readout_nonlinear;
-  struct GyroScale {
-    Eigen::Vector3d error = Eigen::Vector3d::Zero();
-  } gyro_scale;
-  struct GyroMisalignment {  // w_measured = (I + diag(scale) + S) w, S symmetric: no rotation in it
-    double xy = 0.0, xz = 0.0, yz = 0.0;
-  } gyro_misalignment;
-  struct GyroLowpass {
-    double time_constant_s = 0.0;
-  } gyro_lowpass;
-  struct GyroSaturation {
-    double limit_rad_s = 0.0;  // 0: none
-  } gyro_saturation;
-  struct BiasDrift {  // b(t) = b + rate t + swing sin(2 pi t / period)
-    Eigen::Vector3d rate_rad_s2 = Eigen::Vector3d::Zero();
-    Eigen::Vector3d swing_rad_s = Eigen::Vector3d::Zero();
-    double period_s = 60.0;
-  } bias_drift;
-  struct ExposureDelay {
-    double factor = 0.0;  // 0.5: stamps are starts of the exposure
-  } exposure_delay;
-  struct TranslationAcceleration {
-    double shake_m_s = 0.0;  // rms of a velocity of 3 to 8 Hz
-  } translation_acceleration;
-  struct ElectronicStabilisation {
-    double strength = 0.0;     // 1: the rotation is replaced by its smoothed course
-    double smoothing_s = 0.5;  // sigma of the smoothing
-  } electronic_stabilisation;
 };
 
 struct Scenario {

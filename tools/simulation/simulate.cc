@@ -238,7 +238,7 @@ Calibration Truth(const Scenario& scenario) {
   truth.lens = MakePinhole(camera.focal_px, camera.principal_px.value_or(centre),
                            effects.aspect_ratio.ratio);
   if (effects.radial_distortion.kannala_brandt) {
-    const Effects::Lens& k = effects.radial_distortion;
+    const RadialDistortion& k = effects.radial_distortion;
     truth.lens.segment<4>(kKb1) << k.k1, k.k2, k.k3, k.k4;
     truth.distortion_model = DistortionModel::kKannalaBrandt;
   } else {

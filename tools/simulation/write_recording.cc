@@ -110,72 +110,6 @@ Status WriteSensorYaml(const Simulated& s, const Scenario& scenario, const fs::p
   return imu.Close();
 }
 
-struct Parameter {
-  const char* name;
-  const char* unit;
-  double value;
-};
-
-std::vector<Parameter> ParametersOf(const std::string& name, const Effects& e) {
-  if (name == "radial_distortion") {
-    const Effects::Lens& k = e.radial_distortion;
-    if (!k.kannala_brandt) return {{"k1", "1", k.k1}, {"k2", "1", k.k2}};
-    return {{"k1", "1", k.k1}, {"k2", "1", k.k2}, {"k3", "1", k.k3}, {"k4", "1", k.k4}};
-  }
-  if (name == "tangential_distortion") {
-    return {{"p1", "1", e.tangential_distortion.p1}, {"p2", "1", e.tangential_distortion.p2}};
-  }
-  if (name == "aspect_ratio") return {{"ratio", "1", e.aspect_ratio.ratio}};
-  if (name == "focal_drift") {
-    return {{"rate", "px/s", e.focal_drift.rate_px_s},
-            {"breathing", "px", e.focal_drift.breathing_px},
-            {"period", "s", e.focal_drift.period_s}};
-  }
-  if (name == "optical_stabilisation") {
-    return {{"gain", "1", e.optical_stabilisation.gain},
-            {"corner", "Hz", e.optical_stabilisation.corner_hz}};
-  }
-  if (name == "clock_skew") return {{"skew", "ppm", e.clock_skew.ppm}};
-  if (name == "delay_step") {
-    return {{"time", "s", e.delay_step.time_s}, {"step", "s", e.delay_step.step_s}};
-  }
-  if (name == "delay_wander") {
-    return {{"amplitude", "s", e.delay_wander.amplitude_s},
-            {"period", "s", e.delay_wander.period_s}};
-  }
-  if (name == "readout_direction") {
-    return {{"reversed", "1", e.readout_direction.reversed ? 1.0 : 0.0},
-            {"columns", "1", e.readout_direction.columns ? 1.0 : 0.0}};
-  }
-  if (name == "readout_nonlinear") return {{"curve", "1", e.readout_nonlinear.curve}};
-  if (name == "gyro_scale") {
-    const Eigen::Vector3d& s = e.gyro_scale.error;
-    return {{"x", "1", s.x()}, {"y", "1", s.y()}, {"z", "1", s.z()}};
-  }
-  if (name == "gyro_misalignment") {
-    const Effects::GyroMisalignment& m = e.gyro_misalignment;
-    return {{"xy", "rad", m.xy}, {"xz", "rad", m.xz}, {"yz", "rad", m.yz}};
-  }
-  if (name == "gyro_lowpass") return {{"time_constant", "s", e.gyro_lowpass.time_constant_s}};
-  if (name == "gyro_saturation") return {{"limit", "rad/s", e.gyro_saturation.limit_rad_s}};
-  if (name == "bias_drift") {
-    const Effects::BiasDrift& b = e.bias_drift;
-    return {{"rate_x", "rad/s^2", b.rate_rad_s2.x()},
-            {"rate_y", "rad/s^2", b.rate_rad_s2.y()},
-            {"rate_z", "rad/s^2", b.rate_rad_s2.z()},
-            {"swing_x", "rad/s", b.swing_rad_s.x()},
-            {"swing_y", "rad/s", b.swing_rad_s.y()},
-            {"swing_z", "rad/s", b.swing_rad_s.z()},
-            {"period", "s", b.period_s}};
-  }
-  if (name == "exposure_delay") return {{"factor", "1", e.exposure_delay.factor}};
-  if (name == "translation_acceleration") {
-    return {{"shake", "m/s", e.translation_acceleration.shake_m_s}};
-  }
-  return {{"strength", "1", e.electronic_stabilisation.strength},
-          {"smoothing", "s", e.electronic_stabilisation.smoothing_s}};
-}
-
 Status WriteTruth(const Simulated& s, const Scenario& scenario, const fs::path& root) {
   const Calibration& truth = s.truth;
   const LensParameters& lens = truth.lens;
@@ -200,14 +134,14 @@ Status WriteTruth(const Simulated& s, const Scenario& scenario, const fs::path& 
   const Eigen::Quaterniond& q = truth.q_gyro_cam;
   file.Print("extrinsics: {q_gyro_cam_wxyz: {value: [%.12g, %.12g, %.12g, %.12g]}}\n", q.w(), q.x(),
              q.y(), q.z());
-  const std::vector<std::string> names = ActiveEffects(scenario.effects);
-  file.Print(names.empty() ? "effects: []\n" : "effects:\n");
-  for (const std::string& name : names) {
-    file.Print("  - name: %s\n    parameters:\n", name.c_str());
-    for (const Parameter& p : ParametersOf(name, scenario.effects)) {
+  file.Print(ActiveEffects(scenario.effects).empty() ? "effects: []\n" : "effects:\n");
+  scenario.effects.ForEach([&](const auto& effect) {
+    if (!effect.active()) return;
+    file.Print("  - name: %s\n    parameters:\n", effect.kName);
+    for (const TruthParameter& p : effect.Truth()) {
       file.Print("      - {name: %s, unit: %s, value: %.9g}\n", p.name, p.unit, p.value);
     }
-  }
+  });
   if (!s.recording.tracks.empty()) file.Print("noise_px: %.9g\n", scenario.tracks.noise_px);
   file.Print("seed: %llu\n", static_cast<unsigned long long>(scenario.seed));
   return file.Close();

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-namespace camgyro::simulation {
+#include "tools/simulation/effects/simulated_effect.h"
 
-enum class Range { kAny, kPositive, kNotNegative, kFraction /* 0 to 1 */ };
+namespace camgyro::simulation {
 
 // One mapping. Read() every key that exists, then Finish(). The first complaint of a file is kept,
 // as "line 7: camera.focal: unknown key; did you mean focal_px?".
