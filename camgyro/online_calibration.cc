@@ -97,6 +97,9 @@ Status OnlineCalibration::TryStart() {
   Calibration from = prior.mean;
   from.bias_gyro_rad_s = start->bias_gyro_rad_s;
   if (start->focal && start->focal->determined) from.lens[kFocal] = start->focal->value_px;
+  if (const Status added = AddStartEffects(recording, *start, "", &from); !added) {
+    return tl::unexpected(added.error());
+  }
   SlidingWindowOptions window_options;
   window_options.graph = GraphOptionsFor(recording, *start, {});
   window_.emplace(from, prior, gyro_.front().stamp_ns, window_options);

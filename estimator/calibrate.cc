@@ -225,6 +225,26 @@ Prior MakePrior(const Recording& recording, const StartResult& start) {
   return result;
 }
 
+Status AddStartEffects(const Recording& recording, const StartResult& start,
+                       const std::string& list, Calibration* calibration) {
+  EffectSetup setup = MakeEffectSetup(recording, *calibration);
+  setup.clock_skew = start.clock_skew;
+  Result<EffectSet> effects = MakeEffects(list, setup);
+  if (!effects) return tl::unexpected(effects.error());
+  for (const EffectEntry& entry : EffectCatalogue()) {
+    if (!entry.found_at_start || effects->Has(entry.name) || !entry.found_at_start(setup)) continue;
+    const std::string shape = entry.shapes(setup).back();
+    effects->Add(&entry, shape, entry.make(setup, shape));
+  }
+  if (effects->items().empty()) return {};
+  calibration->effect_values = Eigen::VectorXd::Zero(effects->size());
+  for (const EffectSet::Item& item : effects->items()) {
+    item.effect->SetStart(calibration->effect_values.data() + item.first);
+  }
+  calibration->effects = std::make_shared<const EffectSet>(std::move(*effects));
+  return {};
+}
+
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
                                  const CalibrateOptions& options) {
   PairGraphOptions graph_options = options.window.graph;
@@ -268,12 +288,9 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
   if (start->focal && start->focal->determined) estimate.lens[kFocal] = start->focal->value_px;
   if (options.from) {
     estimate = *options.from;
-  } else if (!options.effects.empty()) {
-    Result<EffectSet> effects =
-        MakeEffects(options.effects, MakeEffectSetup(recording, prior.mean));
-    if (!effects) return tl::unexpected(effects.error());
-    estimate.effect_values = Eigen::VectorXd::Zero(effects->size());
-    estimate.effects = std::make_shared<const EffectSet>(std::move(*effects));
+  } else if (const Status added = AddStartEffects(recording, *start, options.effects, &estimate);
+             !added) {
+    return tl::unexpected(added.error());
   }
   const PairGraphOptions graph_options = GraphOptionsFor(recording, *start, options);
   const Calibration from_start = estimate;
@@ -288,8 +305,8 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     const std::vector<TimedPair> pairs = SideBySide(input.pairs);
     for (size_t i = 0; i < pairs.size(); ++i) {
       const TimedPair& pair = pairs[i];
-      for (; next_sample < input.rates.size() &&
-             input.rates[next_sample].time_s <= pair.time_b_s + estimate.delay_s;
+      const double known_s = pair.time_b_s + DelayOf(estimate, pair.second());
+      for (; next_sample < input.rates.size() && input.rates[next_sample].time_s <= known_s;
            ++next_sample) {
         if (window.AddGyroSample(recording.gyro[next_sample], input.rates[next_sample].saturated) !=
             AddResult::kAccepted) {

@@ -81,6 +81,12 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
 //   pixels.
 Prior MakePrior(const Recording& recording, const StartResult& start);
 
+// Puts effects into a calibration that has none: those of a list (MakeEffects), and those that the
+// start has found (EffectEntry::found_at_start), with the values where a fit begins. Errors: the
+// list's.
+Status AddStartEffects(const Recording& recording, const StartResult& start,
+                       const std::string& list, Calibration* calibration);
+
 // Noise and loss as CalibrateRecording uses them for this recording.
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
                                  const CalibrateOptions& options);

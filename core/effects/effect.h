@@ -86,6 +86,8 @@ class Effect {
   // which it needs their prior to have, in the latent's unit; 0: as it is.
   virtual double widened_sigma(PairLatent /*latent*/) const { return 0.0; }
   bool widens_prior() const { return widened_sigma(PairLatent::kTurn) > 0.0; }
+  // Where a fit begins, if not at zero: `values` has size() of them, zero.
+  virtual void SetStart(double* /*values*/) const {}
   // Stamp of the first frame on which it acts [s], for effects that EffectEntry::step_at makes.
   virtual std::optional<double> first_stamp_s() const { return std::nullopt; }
 
@@ -100,6 +102,7 @@ struct EffectSetup {
   std::vector<double> gyro_times_s;       // after the first gyro stamp
   Eigen::Matrix3Xd gyro_rad_s;            // readings, one column per time
   double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
+  double clock_skew = 0.0;                // that the start has found [s/s]; 0: none
   std::vector<double> frame_delays_s;     // of each frame with the effects on time; empty: delay_s
   Eigen::Matrix3d R_gyro_cam = Eigen::Matrix3d::Identity();
   bool has_pixels = true;                                     // false: attitudes
@@ -135,6 +138,8 @@ struct EffectEntry {
   // diagnosis searches: the effect from the first frame on whose stamp is not before `stamp_s`.
   // Null for all others.
   std::function<ShapedEffect(const EffectSetup&, double stamp_s)> step_at = {};
+  // What the start finds beyond doubt is in the model from then on. Null: it does not look for it.
+  std::function<bool(const EffectSetup&)> found_at_start = {};
   // Several of it add up, as steps do; of others, one shape takes the place of another.
   bool adds_up = false;
   // At sizes that real devices have, the plain model without it is so far off that its linear

@@ -32,6 +32,18 @@ void AddUnique(const std::string& name, std::vector<std::string>* names) {
   if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
 }
 
+// Effects that are in the model from the start on, as findings.
+void AddFoundAtStart(const CalibrationReport& report, Diagnosis* diagnosis) {
+  const Calibration& c = report.calibration;
+  if (c.effects == nullptr) return;
+  for (const EffectSet::Item& item : c.effects->items()) {
+    if (!item.entry->found_at_start) continue;
+    diagnosis->faults.push_back(
+        {item.entry->name, "found at the start: " + item.entry->explanation, item.entry->advice});
+    AddUnique(item.entry->name, &diagnosis->effects);
+  }
+}
+
 }  // namespace
 
 Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_at,
@@ -75,6 +87,13 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   input.fit = report.calibration;
   input.start = input.prior.mean;
   input.start.bias_gyro_rad_s = report.start.bias_gyro_rad_s;
+  if (const Status added =
+          AddStartEffects(recording, report.start, options.calibrate.effects, &input.start);
+      !added) {
+    diagnosis.not_tested = added.error().message;
+    return diagnosis;
+  }
+  AddFoundAtStart(report, &diagnosis);
   input.graph = GraphOptionsFor(recording, report.start, options.calibrate);
   input.noise = report.quality.noise_px;
   if (!(input.noise > 0.0)) input.noise = attitudes ? kFirstNoiseRad : kFirstNoisePx;
@@ -93,7 +112,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
                                 entry->advice});
     AddUnique(entry->name, &diagnosis.effects);
   }
-  if (found->effects) {
+  if (found->effects && found->effects != report.calibration.effects) {
     CalibrateOptions with = options.calibrate;
     with.given_start = report.start;
     with.from = *found;

@@ -210,7 +210,8 @@ class Loop {
         });
     if (!fit_.calibration.effects) return;
     for (const auto& item : fit_.calibration.effects->items()) {
-      out->effects.push_back(item.entry->name);
+      const bool known = std::count(out->effects.begin(), out->effects.end(), item.entry->name) > 0;
+      if (!known || item.entry->adds_up) out->effects.push_back(item.entry->name);
     }
   }
 

@@ -6,6 +6,7 @@
 #include "core/format.h"
 #include "core/time.h"
 #include "estimator/start/axis_permutation.h"
+#include "estimator/start/clock_rate.h"
 #include "estimator/start/lag_search.h"
 #include "estimator/start/orientation.h"
 
@@ -136,6 +137,19 @@ StartResult MakeResult(const LagSearch& search, double delay_offset_s,
   return result;
 }
 
+// The delay at the first gyro stamp, which is where the effect clock_skew has it, and a note.
+void SetClockRate(const ClockRate& rate, double lag_s, double offset_s, StartResult* result) {
+  result->clock_skew = rate.skew;
+  result->clock_skew_sigma = rate.sigma;
+  // t_gyro = t_camera (1 + skew) + lag, both from their first stamps, is t_camera + delay there.
+  result->delay_middle_row_s = lag_s / (1.0 + rate.skew) + offset_s;
+  result->notes.push_back(
+      "the gyro's clock runs " + Format("%.2f %%", 100.0 * std::abs(rate.skew)) +
+      (rate.skew > 0.0 ? " fast" : " slow") + " by the camera's: the delay moves by " +
+      Format("%.1f ms", 1e3 * std::abs(rate.skew)) +
+      " per second, and clock_skew is part of the model");
+}
+
 }  // namespace
 
 Result<StartResult> FindStart(const Recording& recording,
@@ -148,7 +162,7 @@ Result<StartResult> FindStart(const Recording& recording,
   if (!made) return tl::unexpected<Error>(made.error());
   CameraRates camera = *std::move(made);
 
-  const double first_s = camera.size() > 0 ? camera.frame_times_s[camera.frame_a.front()] : 0.0;
+  double first_s = camera.size() > 0 ? camera.frame_times_s[camera.frame_a.front()] : 0.0;
   double last_s = first_s;
   for (const int b : camera.frame_b) last_s = std::max(last_s, camera.frame_times_s[b]);
   const double span_s = last_s - first_s;
@@ -159,14 +173,22 @@ Result<StartResult> FindStart(const Recording& recording,
   }
   const double gyro_span_s = gyro.times_s.back();
   const double noise = std::sqrt(3.0) * gyro.Noise(span_s / camera.size());
-  const CameraRates liveliest = LiveliestStretch(camera, kMaxTemplatePairs);
-  const RateAlignment alignment(gyro, std::move(camera));
 
   // delay = lag + offset; a difference of integers, so that large stamps lose nothing.
   const double offset_s =
       SecondsSince(recording.frames.front().stamp_ns, recording.gyro.front().stamp_ns);
   const double guess_lag_s = recording.camera.delay_s.value_or(0.0) +
                              0.5 * recording.camera.readout_s.value_or(0.0) - offset_s;
+
+  const ClockRate rate =
+      FindClockRate(gyro, camera, guess_lag_s - options.search_s, guess_lag_s + options.search_s);
+  if (rate.beyond_doubt) {
+    camera = OnGyroClock(std::move(camera), rate.skew);
+    first_s *= 1.0 + rate.skew;
+    last_s *= 1.0 + rate.skew;
+  }
+  const CameraRates liveliest = LiveliestStretch(camera, kMaxTemplatePairs);
+  const RateAlignment alignment(gyro, std::move(camera));
 
   LagSearch search = SearchLag(alignment, guess_lag_s - options.search_s,
                                guess_lag_s + options.search_s, options.min_pairs);
@@ -217,6 +239,7 @@ Result<StartResult> FindStart(const Recording& recording,
   if (verdict.outcome != Outcome::kTrusted) return CannotEstimate(verdict.reason);
 
   StartResult result = MakeResult(search, offset_s, recording.camera.q_gyro_cam);
+  if (rate.beyond_doubt) SetClockRate(rate, search.fit.lag_s, offset_s, &result);
   if (!note.empty()) result.notes.insert(result.notes.begin(), note);
   return result;
 }

@@ -51,6 +51,11 @@ struct StartResult {
   // whole pictures of a rolling shutter belong to the middle row: this is t_d + t_r / 2 then.
   double delay_middle_row_s = 0.0;
   double delay_sigma_s = 0.0;
+  // The delay grows by so much per second, where that is beyond doubt (clock_rate.h); else zero.
+  // delay_middle_row_s is then that at the first gyro stamp, and curve and runner-up are of the
+  // camera on a clock of the gyro's rate.
+  double clock_skew = 0.0;
+  double clock_skew_sigma = 0.0;
   std::vector<DelayResidual> curve;  // ascending delays
   // Best against second best distinct minimum: ratio of unexplained fractions, 0..1; 1: equally
   // good. "Distinct" is outside of the best one's lobe (half way up to the curve's median).

@@ -8,6 +8,7 @@
 
 #include "core/robust_statistics.h"
 #include "core/time.h"
+#include "estimator/start/clock_rate.h"
 #include "estimator/start/lag_search.h"
 #include "estimator/start/rate_alignment.h"
 #include "estimator/start/start_fit.h"
@@ -46,7 +47,7 @@ void Measure(const Recording& recording, const StartResult& near, double lag_s,
   GyroRates gyro(recording.gyro);
   auto camera = MakeCameraRates(recording, point->rotations, gyro);
   if (!camera || camera->size() < options.min_pairs) return;
-  const RateAlignment alignment(std::move(gyro), *std::move(camera));
+  const RateAlignment alignment(std::move(gyro), OnGyroClock(*std::move(camera), near.clock_skew));
   const StartFit fit = FitStart(alignment, lag_s, near.q_gyro_cam, near.bias_gyro_rad_s, 1.0);
   Eigen::Matrix3Xd rates;
   std::vector<char> covered;
@@ -118,8 +119,10 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
     if (k == order.front()) first_error = tl::unexpected<Error>(near.error());
   }
   if (!near) return first_error;
-  const double lag_s = near->delay_middle_row_s - SecondsSince(recording.frames.front().stamp_ns,
-                                                               recording.gyro.front().stamp_ns);
+  // The inverse of what FindStart makes of a lag.
+  const double lag_s = (near->delay_middle_row_s - SecondsSince(recording.frames.front().stamp_ns,
+                                                                recording.gyro.front().stamp_ns)) *
+                       (1.0 + near->clock_skew);
 
   // 2. The scan, and two points more around its best.
   for (ScanPoint& point : points) Measure(recording, *near, lag_s, options, &point);

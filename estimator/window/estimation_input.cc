@@ -89,6 +89,15 @@ EstimationInput MakeEstimationInput(const Recording& recording, const PairSelect
   return input;
 }
 
+double DelayOf(const Calibration& calibration, const FrameTime& frame) {
+  const PairEffects effects = calibration.pair_effects();
+  if (effects.set == nullptr) return calibration.delay_s;
+  const Eigen::Vector2d size_px(calibration.width_px, calibration.height_px);
+  EffectSet::Change change;
+  effects.set->ChangeObservation({0.5 * size_px, size_px, frame}, &change);
+  return calibration.delay_s + change.time.row(0).dot(calibration.effect_values);
+}
+
 EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration) {
   EffectSetup setup;
   setup.size_px << recording.camera.width_px, recording.camera.height_px;
@@ -101,12 +110,9 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   for (const Frame& frame : recording.frames) {
     setup.frames.push_back({SecondsSince(origin_ns, frame.stamp_ns), frame.exposure_s});
   }
-  if (const PairEffects effects = calibration.pair_effects(); effects.set != nullptr) {
-    EffectSet::Change change;
+  if (calibration.pair_effects().set != nullptr) {
     for (const FrameTime& frame : setup.frames) {
-      effects.set->ChangeObservation({0.5 * setup.size_px, setup.size_px, frame}, &change);
-      setup.frame_delays_s.push_back(calibration.delay_s +
-                                     change.time.row(0).dot(calibration.effect_values));
+      setup.frame_delays_s.push_back(DelayOf(calibration, frame));
     }
   }
   setup.gyro_rad_s.resize(3, static_cast<Eigen::Index>(recording.gyro.size()));

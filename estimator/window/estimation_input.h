@@ -57,6 +57,9 @@ EstimationInput MakeEstimationInput(const Recording& recording,
 // Pairs of which none begins before the one before ends, for estimators that go along.
 std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs);
 
+// The delay of a frame with the effects, in the middle of its picture [s].
+double DelayOf(const Calibration& calibration, const FrameTime& frame);
+
 // What effects may know of a recording, with what a calibration says of it so far.
 EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration);
 

@@ -6,6 +6,7 @@
 
 #include "core/robust_statistics.h"
 #include "core/time.h"
+#include "estimator/window/estimation_input.h"
 
 namespace camgyro {
 
@@ -63,7 +64,7 @@ void SlidingWindow::ProcessPending() {
       ++num_skipped_;
     }
     // A pair to come starts after this one; its delay may still move, but not by a second.
-    graph_.ForgetOldRates(next.frame_a.stamp_s + latest_.estimate.delay_s - 1.0);
+    graph_.ForgetOldRates(next.frame_a.stamp_s + DelayOf(latest_.estimate, next.frame_a) - 1.0);
     pending_.pop_front();
   }
 }

@@ -95,6 +95,30 @@ TEST(CalibrateRecording, MakesEffectsAnewThatDependOnEffectsOnTime) {
   EXPECT_NEAR(c.delay_s, s.truth.delay_s, 4.0 * c.sigma()[kStateDelay]);
 }
 
+// Within 24 s the delay moves by 0.19 s. The start finds it, and says so.
+TEST(CalibrateRecording, TakesAClockThatRunsFastIntoTheModel) {
+  Scenario scenario = ShortScenario(24.0);
+  scenario.tracks.count = 50;
+  scenario.effects.clock_skew.ppm = 8000.0;
+  const Simulated s = SimulateTracks(scenario).value();
+  const auto rotations = [pairs = SpreadPairs(PairsForRotations(s.recording), 400),
+                          camera = s.recording.camera](double focal_px) {
+    return CameraRotationsOf(pairs, camera, focal_px);
+  };
+  const Result<CalibrationReport> report = CalibrateRecording(s.recording, rotations, {});
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_THAT(report->notes, ::testing::Contains(::testing::HasSubstr("clock runs 0.80 % fast")));
+  const Calibration& c = report->calibration;
+  ASSERT_NE(c.effects, nullptr);
+  ASSERT_TRUE(c.effects->Has("clock_skew"));
+  const double sigma = std::sqrt(c.effect_covariance(0, 0));
+  EXPECT_NEAR(c.effect_values[0], 8000.0, 4.0 * sigma);
+  EXPECT_LT(sigma, 20.0);
+  EXPECT_LT(ErrorInSigmas(c, s.truth).cwiseAbs().maxCoeff(), 4.5);
+  ASSERT_TRUE(report->online.has_value());
+  EXPECT_NEAR(report->online->effect_values[0], 8000.0, 100.0);
+}
+
 TEST(CalibrateRecording, RefusesARecordingThatDoesNotTurn) {
   Scenario scenario = ShortScenario(3.0);
   scenario.motion.rotation_rms_rad_s.setZero();

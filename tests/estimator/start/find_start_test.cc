@@ -291,5 +291,68 @@ TEST(FindStart, IsRepeatable) {
   EXPECT_EQ(a->q_gyro_cam.coeffs(), b->q_gyro_cam.coeffs());
 }
 
+// The frames as a camera stamps them whose clock runs slow by as much as the gyro's runs fast.
+void StretchFrames(double skew, Simulated* s) {
+  const int64_t first_ns = s->recording.frames.front().stamp_ns;
+  for (Frame& frame : s->recording.frames) {
+    const double since_s = 1e-9 * static_cast<double>(frame.stamp_ns - first_ns);
+    frame.stamp_ns = first_ns + std::llround(1e9 * since_s / (1.0 + skew));
+  }
+}
+
+// Delay by the middle of what is left of a search of one delay: the effect is on its own.
+TEST(FindStart, FindsAClockThatRunsFastOrSlow) {
+  const std::pair<double, double> cases[] = {// skew, duration [s]
+                                             {0.008, 40.0},
+                                             {-0.008, 40.0},
+                                             {0.02, 40.0},
+                                             {-0.02, 40.0},
+                                             {0.003, 120.0}};
+  for (const auto& [skew, duration_s] : cases) {
+    SCOPED_TRACE(std::to_string(skew) + " over " + std::to_string(duration_s) + " s");
+    SimulatedTruth truth = UsualTruth();
+    truth.duration_s = duration_s;
+    truth.gyro_hz = 100.0;
+    Simulated s = Simulate(SmoothRandomRate(11, 0.8), truth, 2);
+    StretchFrames(skew, &s);
+    if (duration_s > 100.0) {  // as a command takes them, some hundreds of pairs
+      std::vector<CameraRotation> some;
+      for (size_t i = 0; i < s.rotations.size(); i += 9) some.push_back(s.rotations[i]);
+      s.rotations = some;
+    }
+    const auto start = FindStart(s.recording, s.rotations, {});
+    ASSERT_TRUE(start) << start.error().message;
+    EXPECT_NEAR(start->clock_skew, skew, 1e-4);
+    EXPECT_THAT(start->notes, ::testing::Contains(HasSubstr("clock")));
+    // At the first gyro stamp, 0.5 s before the first frame.
+    EXPECT_NEAR(start->delay_middle_row_s, truth.delay_s - 0.5 * skew / (1.0 + skew), 3e-3);
+    EXPECT_LT(AngleBetween(start->q_gyro_cam, truth.q_gyro_cam), 0.02);
+  }
+}
+
+// A step, a delay that wanders, jitter: no line, and no clock that runs fast. Nor on clean data.
+TEST(FindStart, TakesNoOtherDelayForAClock) {
+  for (const char* what : {"clean", "step", "wander", "jitter"}) {
+    SCOPED_TRACE(what);
+    SimulatedTruth truth = UsualTruth();
+    truth.duration_s = 40.0;
+    truth.gyro_hz = 100.0;
+    Simulated s = Simulate(SmoothRandomRate(12, 0.8), truth, 3);
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal;
+    for (size_t i = 0; i < s.recording.frames.size(); ++i) {
+      const double t = static_cast<double>(i) / truth.fps;
+      const double off_s = what == std::string("step")     ? (t > 18.0 ? 0.03 : 0.0)
+                           : what == std::string("wander") ? 0.02 * std::sin(2.0 * M_PI * t / 60.0)
+                           : what == std::string("jitter") ? 0.004 * normal(random)
+                                                           : 0.0;
+      s.recording.frames[i].stamp_ns += std::llround(1e9 * off_s);
+    }
+    const auto start = FindStart(s.recording, s.rotations, {});
+    ASSERT_TRUE(start) << start.error().message;
+    EXPECT_EQ(start->clock_skew, 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace camgyro
