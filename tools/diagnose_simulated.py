@@ -43,9 +43,10 @@ def read(path):
         return yaml.safe_load(file)
 
 
-def as_fitted(truth, duration_s):
+def as_fitted(truth, duration_s, recording):
     """The truth, with what the effects are said to shift: a gyro's filter delays by its time
-    constant, which is part of t_d; the bias is that of the middle if it drifts."""
+    constant, which is part of t_d; the bias is that of the middle if it drifts, and that under the
+    mean force if the gyro feels forces."""
     truth = copy.deepcopy(truth)
     values = {e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
               for e in truth["effects"]}
@@ -56,6 +57,11 @@ def as_fitted(truth, duration_s):
         margin_s = read(SOURCE + "/tools/scenarios/default.yaml")["margin_s"]
         bias["value"] = [b + values["bias_drift"]["rate_" + axis] * (
             0.5 * duration_s + margin_s) for axis, b in zip("xyz", bias["value"])]
+    if "gyro_g_sensitivity" in values:
+        bias = truth["gyro"]["bias_rad_s"]
+        force = np.loadtxt(recording + "/imu0/data.csv", delimiter=",")[:, 4:7].mean(axis=0)
+        bias["value"] = [b + values["gyro_g_sensitivity"][axis] * f
+                         for axis, b, f in zip("xyz", bias["value"], force)]
     return truth
 
 
@@ -68,6 +74,7 @@ def true_parameters(truth, effect):
     for name, new, convert in (
             ("ratio", "aspect_ratio_change", lambda v: v - 1),
             ("time_constant", "time_constant_sq", lambda v: v * v),
+            ("factor", "factor_sq", lambda v: v * v),
             ("gain", "shift_per_rad", lambda v: v * camera["focal_px"]["value"]),
             ("curve", "bend", lambda v: v * shutter["readout_s"]["value"])):
         if name in values:
@@ -151,7 +158,7 @@ def run(options, case):
                             "--out", informed, "--quiet"], capture_output=True, check=False)
         if os.path.exists(informed + "/calibration.yaml"):
             reference = read(informed + "/calibration.yaml")
-            truth = as_fitted(read(recording + "/truth.yaml"), options.duration)
+            truth = as_fitted(read(recording + "/truth.yaml"), options.duration, recording)
             sizes = [max((abs(p["value"]) / p["sigma"] for p in e["parameters"] if p["sigma"] > 0),
                          default=None) for e in reference.get("effects", [])]
             result["size"] = None if None in sizes or not sizes else min(sizes)

@@ -23,6 +23,8 @@ const std::vector<EffectEntry>& EffectCatalogue() {
                                                      GyroAxisDelayEntry(),
                                                      GyroSaturationEntry(),
                                                      BiasDriftEntry(),
+                                                     GyroGSensitivityEntry(),
+                                                     ExposureLowpassEntry(),
                                                      ExposureDelayEntry(),
                                                      TranslationAccelerationEntry(),
                                                      ElectronicStabilisationEntry()};

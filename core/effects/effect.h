@@ -101,6 +101,8 @@ struct EffectSetup {
   std::vector<FrameTime> frames;          // at least two
   std::vector<double> gyro_times_s;       // after the first gyro stamp
   Eigen::Matrix3Xd gyro_rad_s;            // readings, one column per time
+  std::vector<double> accel_times_s;      // after the first gyro stamp; empty: no accelerometer
+  Eigen::Matrix3Xd accel_m_s2;            // specific force in the gyro frame, one column per time
   double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
   double clock_skew = 0.0;                // that the start has found [s/s]; 0: none
   std::vector<double> frame_delays_s;     // of each frame with the effects on time; empty: delay_s

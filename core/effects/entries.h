@@ -22,6 +22,8 @@ EffectEntry GyroLowpassEntry();
 EffectEntry GyroAxisDelayEntry();
 EffectEntry GyroSaturationEntry();
 EffectEntry BiasDriftEntry();
+EffectEntry GyroGSensitivityEntry();
+EffectEntry ExposureLowpassEntry();
 EffectEntry ExposureDelayEntry();
 EffectEntry TranslationAccelerationEntry();
 EffectEntry ElectronicStabilisationEntry();

@@ -6,6 +6,13 @@
 #include "estimator/diagnosis/thresholds.h"
 
 namespace camgyro {
+namespace {
+
+bool IsOneSided(const Effect& effect) {
+  return effect.size() == 1 && effect.parameters()[0].plausible_min == 0.0;
+}
+
+}  // namespace
 
 std::vector<Candidate> MissingEffects(const Calibration& model, const EffectSetup& setup) {
   std::vector<Candidate> candidates;
@@ -93,7 +100,10 @@ std::vector<std::vector<std::string>> Indistinguishable(
       if (all[i].columns().empty() || all[j].columns().empty()) continue;
       // A flexible curve contains simpler effects: that is no alias of the motion.
       if (all[j].columns().size() > kAliasFactor * all[i].columns().size() + kAliasMore) continue;
-      if (AliasOf(scores, all[i].columns(), all[j].columns(), information) > kAliasLimit) {
+      const double alias = AliasOf(scores, all[i].columns(), all[j].columns(), information);
+      // Parameters that both begin at zero: their signs tell.
+      const bool opposite = alias < 0.0 && IsOneSided(*all[i].effect) && IsOneSided(*all[j].effect);
+      if (std::abs(alias) > kAliasLimit && !opposite) {
         aliases.push_back({all[i].entry->name, all[j].entry->name});
       }
     }

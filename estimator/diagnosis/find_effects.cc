@@ -129,6 +129,14 @@ void AddWidened(const RoundScores& round, std::vector<Contestant>* all) {
   }
 }
 
+// A sign that the effect cannot have: of a parameter whose range begins at zero, below it. Two
+// effects may be of opposite signs of one column (gyro_lowpass, exposure_lowpass): what is not
+// refitted leaves its place to other rivals.
+bool HasWrongSign(const CandidateResult& r) {
+  return r.parameters == 1 && r.parameter_info[0].plausible_min == 0.0 && r.sigma.size() == 1 &&
+         r.estimate[0] < -kImplausibleSigmas * r.sigma[0];
+}
+
 // Significance, all candidates together, and a gain beyond its own noise; best first.
 void JudgeAndSort(double significance, std::vector<Contestant>* all) {
   const double tests = static_cast<double>(all->size());
@@ -136,6 +144,8 @@ void JudgeAndSort(double significance, std::vector<Contestant>* all) {
     r.significant = r.p_value * tests <= significance;
     if (!r.significant) {
       r.rejected = "not significant";
+    } else if (HasWrongSign(r)) {
+      r.rejected = r.parameter_info[0].name + " outside of what real devices show";
     } else if (!GainBearsOut(r, tests)) {
       r.rejected = "no gain on unseen frames beyond its noise";
     }

@@ -298,6 +298,7 @@ double AliasOf(const Scores& scores, const std::vector<int>& first, const std::v
   Eigen::MatrixXd C = e.M.topRightCorner(n, m);
   C = L_A.triangularView<Eigen::Lower>().solve(C);
   C = L_B.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd(C.transpose())).transpose();
+  if (C.size() == 1) return C(0, 0);
   return C.jacobiSvd().singularValues()[0];
 }
 

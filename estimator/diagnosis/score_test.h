@@ -61,8 +61,9 @@ Gain SumOf(const std::vector<double>& gain_by_block);
 // Fall of chi2 in each block if the parameters change by `step`.
 std::vector<double> GainOfStep(const Scores& scores, const Eigen::VectorXd& step);
 
-// |cosine| between two effects: correlation of their estimates' directions after the model's
-// columns are projected out (canonical, the largest); near 1: this motion cannot tell them apart.
+// Cosine between two effects: correlation of their estimates' directions after the model's
+// columns are projected out (canonical, the largest; with its sign if both have one parameter);
+// near 1 or -1: this motion cannot tell them apart.
 double AliasOf(const Scores& scores, const std::vector<int>& first, const std::vector<int>& second,
                const Eigen::VectorXd& prior_information);
 

@@ -121,6 +121,12 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
         sample.omega_gyro_rad_s;
     setup.gyro_times_s.push_back(SecondsSince(origin_ns, sample.stamp_ns));
   }
+  setup.accel_m_s2.resize(3, static_cast<Eigen::Index>(recording.accel.size()));
+  for (const AccelSample& sample : recording.accel) {
+    setup.accel_m_s2.col(static_cast<Eigen::Index>(setup.accel_times_s.size())) =
+        sample.accel_gyro_m_s2;
+    setup.accel_times_s.push_back(SecondsSince(origin_ns, sample.stamp_ns));
+  }
   return setup;
 }
 

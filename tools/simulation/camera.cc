@@ -181,6 +181,24 @@ std::optional<Vector3d> SimulatedCamera::Unproject(const Vector2d& px, double ti
   return Vector3d(scale * m.x(), scale * m.y(), 1.0);
 }
 
+// Gauss-Legendre, 3 points.
+std::optional<Vector2d> SimulatedCamera::MeanOverExposure(
+    const FrameTiming& frame, const std::function<Vector3d(double)>& point_world,
+    const Vector2d& px, double time_s) const {
+  const double factor = scenario_.effects.exposure_lowpass.factor;
+  if (!(factor > 0.0)) return px;
+  const double offset_s = 0.5 * factor * frame.exposure_s * std::sqrt(0.6);
+  Vector2d sum = 8.0 * px;
+  for (const double at_s : {time_s - offset_s, time_s + offset_s}) {
+    const CameraState state = trajectory_->At(at_s);
+    const std::optional<Vector2d> there =
+        Project(state.R_world_cam.transpose() * (point_world(at_s) - state.p_world_m), at_s);
+    if (!there) return std::nullopt;
+    sum += 5.0 * *there;
+  }
+  return sum / 18.0;
+}
+
 std::optional<SimulatedCamera::Observation> SimulatedCamera::Observe(
     const FrameTiming& frame, const std::function<Vector3d(double)>& point_world) const {
   const CameraOptions& camera = scenario_.camera;
@@ -192,8 +210,9 @@ std::optional<SimulatedCamera::Observation> SimulatedCamera::Observe(
     if (!px) return std::nullopt;
     const double exposed_s = ExposureTime(frame, *px);
     if (std::abs(exposed_s - time_s) < 1e-13) {
-      if (!InPicture(*px)) return std::nullopt;
-      return Observation{*px, exposed_s, point.z()};
+      const std::optional<Vector2d> seen = MeanOverExposure(frame, point_world, *px, exposed_s);
+      if (!seen || !InPicture(*seen)) return std::nullopt;
+      return Observation{*seen, exposed_s, point.z()};
     }
     // Newton's method with the motion of a static point through a pinhole: what this neglects
     // costs iterations, not accuracy.

@@ -72,6 +72,11 @@ class SimulatedCamera {
 
  private:
   LensParameters LensAt(double time_s) const;
+  // Effect exposure_lowpass: where a point is on average while the pixel is exposed; px itself
+  // without. Nothing where it has no pixel.
+  std::optional<Eigen::Vector2d> MeanOverExposure(
+      const FrameTiming& frame, const std::function<Eigen::Vector3d(double)>& point_world,
+      const Eigen::Vector2d& px, double time_s) const;
   Eigen::Matrix3d SmoothedOrientation(double time_s) const;
   Eigen::Matrix3d Correction(const FrameTiming& frame, double time_s) const;
 

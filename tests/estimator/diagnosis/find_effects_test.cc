@@ -165,6 +165,33 @@ TEST(FindEffects, NamesTheGyrosFilterWhenWalking) {
   EXPECT_NEAR(found.estimate[0], 0.008 * 0.008, 4.0 * found.sigma[0]);
 }
 
+// A bias that drifts is what such data show without an accelerometer.
+TEST(FindEffects, NamesAGyroThatFeelsForces) {
+  const Diagnosis diagnosis =
+      Find(Simulate(2, {"duration_s=30", "tracks.count=100",
+                        "effects.gyro_g_sensitivity.factor_rad_s_m=[1.0e-3, -8.0e-4, 6.0e-4]"}));
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("gyro_g_sensitivity"));
+  const CandidateResult& found = diagnosis.rounds.front().candidates.front();
+  EXPECT_EQ(found.shape, "diagonal");
+  const Eigen::Vector3d truth(1.0e-3, -8.0e-4, 6.0e-4);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(found.estimate[k], truth[k], 3.5 * found.sigma[k]) << k;
+}
+
+// Of the other sign than the gyro's filter, which is significant as well, and impossible.
+TEST(FindEffects, NamesALongExposure) {
+  const Diagnosis diagnosis =
+      Find(Simulate(3, {"duration_s=24", "motion.kind=running", "camera.exposure_s=0.025",
+                        "effects.exposure_lowpass.factor=1"}));
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("exposure_lowpass"));
+  const auto& candidates = diagnosis.rounds.front().candidates;
+  EXPECT_NEAR(candidates.front().estimate[0], 1.0, 4.0 * candidates.front().sigma[0]);
+  EXPECT_TRUE(std::any_of(candidates.begin(), candidates.end(), [](const CandidateResult& c) {
+    return c.name == "gyro_lowpass" && c.significant &&
+           testing::Value(c.rejected, testing::HasSubstr("outside of what real devices show"));
+  }));
+  EXPECT_THAT(diagnosis.indistinguishable, testing::IsEmpty());
+}
+
 // Walking, five sigmas: the frames that choose, half of the data, have a gain of 6 +- 10 with seed
 // 2 (half of the statistic, 10, is expected), which agrees; those that fit have little with seed 7.
 // Both together tell.

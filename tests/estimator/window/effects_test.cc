@@ -94,6 +94,13 @@ TEST_P(EffectAgainstSimulator, FitsItsPixels) {
     const double middle_s = 0.5 * (input.pairs.front().time_a_s + input.pairs.back().time_b_s);
     calibration.bias_gyro_rad_s += (middle_s + test.delay_s) * calibration.effect_values;
   }
+  if (test.name == "gyro_g_sensitivity") {  // and that under the mean force
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const AccelSample& sample : simulated->recording.accel) {
+      mean += sample.accel_gyro_m_s2 / static_cast<double>(simulated->recording.accel.size());
+    }
+    calibration.bias_gyro_rad_s += mean.cwiseProduct(calibration.effect_values.head<3>());
+  }
   const double with = Rms(input, calibration);
   EXPECT_LT(with, without / test.gain) << "without " << without << " px, with " << with << " px";
 }
@@ -123,6 +130,14 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"bias_drift:linear",
              "effects.bias_drift={rate_rad_s2: [0.005,-0.003,0.002]}",
              {0.005, -0.003, 0.002}},
+        Case{"gyro_g_sensitivity",
+             "effects.gyro_g_sensitivity={factor_rad_s_m: [0.001,-0.0008,0.0006]}",
+             {0.001, -0.0008, 0.0006}},
+        // The path through the exposure is averaged, too, and fourth order is neglected.
+        Case{"exposure_lowpass",
+             "effects.exposure_lowpass={factor: 1}|camera.exposure_s=0.02|motion.kind=running",
+             {1.0},
+             3.0},
         Case{"exposure_delay",
              "effects.exposure_delay={factor: 0.5}|camera.exposure_s=0.012|"
              "camera.exposure_swing=0.8",
@@ -183,6 +198,13 @@ TEST(GyroAxisDelay, FitsReadingsThatAreShiftedAxisByAxis) {
   ASSERT_TRUE(effects);
   calibration.effects = std::make_shared<const EffectSet>(*effects);
   calibration.effect_values = Eigen::Vector2d(0.005, 0.0075);
+  if (test.name == "gyro_g_sensitivity") {  // and that under the mean force
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const AccelSample& sample : simulated->recording.accel) {
+      mean += sample.accel_gyro_m_s2 / static_cast<double>(simulated->recording.accel.size());
+    }
+    calibration.bias_gyro_rad_s += mean.cwiseProduct(calibration.effect_values.head<3>());
+  }
   const double with = Rms(input, calibration);
   EXPECT_LT(with, without / 5.0) << "without " << without << " px, with " << with << " px";
 }

@@ -11,7 +11,9 @@
 #include "tools/simulation/effects/delay_wander.h"
 #include "tools/simulation/effects/electronic_stabilisation.h"
 #include "tools/simulation/effects/exposure_delay.h"
+#include "tools/simulation/effects/exposure_lowpass.h"
 #include "tools/simulation/effects/focal_drift.h"
+#include "tools/simulation/effects/gyro_g_sensitivity.h"
 #include "tools/simulation/effects/gyro_lowpass.h"
 #include "tools/simulation/effects/gyro_misalignment.h"
 #include "tools/simulation/effects/gyro_saturation.h"
@@ -41,6 +43,8 @@ struct Effects {
   GyroLowpass gyro_lowpass;
   GyroSaturation gyro_saturation;
   BiasDrift bias_drift;
+  GyroGSensitivity gyro_g_sensitivity;
+  ExposureLowpass exposure_lowpass;
   ExposureDelay exposure_delay;
   TranslationAcceleration translation_acceleration;
   ElectronicStabilisation electronic_stabilisation;
@@ -73,6 +77,8 @@ struct Effects {
     visit(self.gyro_lowpass);
     visit(self.gyro_saturation);
     visit(self.bias_drift);
+    visit(self.gyro_g_sensitivity);
+    visit(self.exposure_lowpass);
     visit(self.exposure_delay);
     visit(self.translation_acceleration);
     visit(self.electronic_stabilisation);
