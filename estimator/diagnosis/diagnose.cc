@@ -44,32 +44,77 @@ void AddFoundAtStart(const CalibrationReport& report, Diagnosis* diagnosis) {
   }
 }
 
+// As calibrate has it. If that is refused: a gyro in the wrong unit or with mirrored axes, which is
+// repaired, or a picture without the fast rotation?
+Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAtFocal& rotations_at,
+                                            const CalibrateOptions& options,
+                                            const Progress& progress, Recording* recording,
+                                            std::vector<DataFault>* faults) {
+  Result<CalibrationReport> report =
+      CalibrateRecording(*recording, rotations_at, options, Part(progress, 0.0, 1.0));
+  if (report || report.error().kind != ErrorKind::kCannotEstimate) return report;
+  if (const auto repaired = RepairGyro(rotations_at, options.start, recording)) {
+    faults->push_back(*repaired);
+    return CalibrateRecording(*recording, rotations_at, options, progress);
+  }
+  const std::vector<CameraRotation> rotations = CameraRotationsIn(*recording, rotations_at);
+  std::optional<std::string> found = FindElectronicStabilisation(*recording, rotations);
+  if (recording->declared_stabilisation) {
+    found = "the file says so (" + *recording->declared_stabilisation + ")" +
+            (found ? ", and " + *found : "");
+  }
+  if (found) {
+    const EffectEntry* entry = FindEffect("electronic_stabilisation");
+    faults->push_back({entry->name, *found, entry->advice});
+  }
+  return report;
+}
+
+// Rows from bottom to top need no effect, but are named.
+void AddReversedReadout(Diagnosis* diagnosis) {
+  const Calibration& c = diagnosis->before->calibration;
+  if (!c.determined[kStateReadout] || c.readout_s >= -kReversedSigmas * c.sigma()[kStateReadout]) {
+    return;
+  }
+  const EffectEntry* entry = FindEffect("readout_direction");
+  diagnosis->faults.push_back({entry->name,
+                               "the readout time is negative: rows are read from bottom to top",
+                               entry->advice});
+  AddUnique(entry->name, &diagnosis->effects);
+}
+
+// All frames with the effects that were found.
+void CalibrateWith(const Calibration& found, const LoopInput& input,
+                   const CameraRotationsAtFocal& rotations_at, const DiagnoseOptions& options,
+                   const Progress& progress, Diagnosis* diagnosis) {
+  const Recording& recording = *input.recording;
+  CalibrateOptions with = options.calibrate;
+  with.given_start = diagnosis->before->start;
+  with.from = found;
+  // Once all frames may be seen, those of the report, too.
+  const EstimationInput all = MakeEstimationInput(recording, SelectPairs(recording));
+  PlaceDelaySteps(recording, all, all.pairs, kStepMarginBlocks * diagnosis->block_s, input.noise,
+                  input.graph, &*with.from);
+  with.online = false;
+  const Result<CalibrationReport> after =
+      CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));
+  if (after) {
+    diagnosis->after = *after;
+  } else {
+    diagnosis->before->doubts.push_back(
+        "this calibration is without the effects: with them, the fit of all frames failed: " +
+        after.error().message);
+  }
+}
+
 }  // namespace
 
 Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_at,
                    const DiagnoseOptions& options, const Progress& progress) {
   Diagnosis diagnosis;
   diagnosis.faults = FindDataFaults(recording);
-  Result<CalibrationReport> before =
-      CalibrateRecording(recording, rotations_at, options.calibrate, Part(progress, 0.0, 1.0));
-  if (!before && before.error().kind == ErrorKind::kCannotEstimate) {
-    // A gyro in the wrong unit or with mirrored axes? A picture without the fast rotation?
-    if (const auto repaired = RepairGyro(rotations_at, options.calibrate.start, &recording)) {
-      diagnosis.faults.push_back(*repaired);
-      before = CalibrateRecording(recording, rotations_at, options.calibrate, progress);
-    } else {
-      const std::vector<CameraRotation> rotations = CameraRotationsIn(recording, rotations_at);
-      std::optional<std::string> found = FindElectronicStabilisation(recording, rotations);
-      if (recording.declared_stabilisation) {
-        found = "the file says so (" + *recording.declared_stabilisation + ")" +
-                (found ? ", and " + *found : "");
-      }
-      if (found) {
-        const EffectEntry* entry = FindEffect("electronic_stabilisation");
-        diagnosis.faults.push_back({entry->name, *found, entry->advice});
-      }
-    }
-  }
+  const Result<CalibrationReport> before =
+      CalibrateOrSayWhy(rotations_at, options.calibrate, progress, &recording, &diagnosis.faults);
   for (const DataFault& fault : diagnosis.faults) {
     if (FindEffect(fault.name) != nullptr) AddUnique(fault.name, &diagnosis.effects);
   }
@@ -80,7 +125,6 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   diagnosis.before = *before;
 
   const CalibrationReport& report = *diagnosis.before;
-  const bool attitudes = recording.HasOnlyAttitudes();
   LoopInput input;
   input.recording = &recording;
   input.prior = MakePrior(recording, report.start);
@@ -96,40 +140,17 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   AddFoundAtStart(report, &diagnosis);
   input.graph = GraphOptionsFor(recording, report.start, options.calibrate);
   input.noise = report.quality.noise_px;
-  if (!(input.noise > 0.0)) input.noise = attitudes ? kFirstNoiseRad : kFirstNoisePx;
+  if (!(input.noise > 0.0)) {
+    input.noise = recording.HasOnlyAttitudes() ? kFirstNoiseRad : kFirstNoisePx;
+  }
   const Result<Calibration> found = FindEffects(input, options, progress, &diagnosis);
   if (!found) {
     diagnosis.not_tested = found.error().message;
     return diagnosis;
   }
-  const int bottom_up = kStateReadout;
-  const Calibration& c = diagnosis.before->calibration;
-  if (c.determined[static_cast<size_t>(bottom_up)] &&
-      c.readout_s < -kReversedSigmas * c.sigma()[bottom_up]) {
-    const EffectEntry* entry = FindEffect("readout_direction");
-    diagnosis.faults.push_back({entry->name,
-                                "the readout time is negative: rows are read from bottom to top",
-                                entry->advice});
-    AddUnique(entry->name, &diagnosis.effects);
-  }
+  AddReversedReadout(&diagnosis);
   if (found->effects && found->effects != report.calibration.effects) {
-    CalibrateOptions with = options.calibrate;
-    with.given_start = report.start;
-    with.from = *found;
-    // Once all frames may be seen, those of the report, too.
-    const EstimationInput all = MakeEstimationInput(recording, SelectPairs(recording));
-    PlaceDelaySteps(recording, all, all.pairs, kStepMarginBlocks * diagnosis.block_s, input.noise,
-                    input.graph, &*with.from);
-    with.online = false;
-    const Result<CalibrationReport> after =
-        CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));
-    if (after) {
-      diagnosis.after = *after;
-    } else {
-      diagnosis.before->doubts.push_back(
-          "this calibration is without the effects: with them, the fit of all frames failed: " +
-          after.error().message);
-    }
+    CalibrateWith(*found, input, rotations_at, options, progress, &diagnosis);
   }
   return diagnosis;
 }

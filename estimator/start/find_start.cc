@@ -150,6 +150,62 @@ void SetClockRate(const ClockRate& rate, double lag_s, double offset_s, StartRes
       " per second, and clock_skew is part of the model");
 }
 
+// The two streams of a recording, ready for a search.
+struct Streams {
+  RateAlignment alignment;
+  double first_s, last_s;  // of the camera's rotations, after the first frame
+  double gyro_span_s;
+  double offset_s;     // delay = lag + offset
+  double guess_lag_s;  // the recording's
+  double gyro_noise_rad_s;
+};
+
+// Clocks of different origin: every alignment with half of the shorter stream in the other. What is
+// better than the search within the range takes its place, with its verdict and a note.
+void SearchAllAlignments(const Streams& s, const StartOptions& options, LagSearch* search,
+                         Verdict* verdict, std::string* note) {
+  const double span_s = s.last_s - s.first_s;
+  const double overlap_s = 0.5 * std::min(span_s, s.gyro_span_s);
+  const CameraRates liveliest = LiveliestStretch(s.alignment.camera(), kMaxTemplatePairs);
+  const RateAlignment reduced(s.alignment.gyro(), liveliest);
+  const int min_pairs = std::max(options.min_pairs, liveliest.size() / 4);
+  const LagSearch all =
+      SearchLag(reduced, overlap_s - s.last_s, s.gyro_span_s - overlap_s - s.first_s, min_pairs);
+  if (!all.found) return;
+  Verdict all_verdict = Judge(all, s.gyro_noise_rad_s, s.offset_s, options);
+  LagSearch near = SearchLag(s.alignment, all.fit.lag_s - options.search_s,
+                             all.fit.lag_s + options.search_s, options.min_pairs);
+  if (all_verdict.outcome == Outcome::kTrusted) {
+    all_verdict = Judge(near, s.gyro_noise_rad_s, s.offset_s, options);
+  }
+  if (near.runner_up_ratio < all.runner_up_ratio) {
+    near.runner_up_ratio = all.runner_up_ratio;
+    near.runner_up_lag_s = all.runner_up_lag_s;
+  }
+  // A refusal that names a cause, other than a bad fit, is better than none.
+  const bool not_found = verdict->outcome == Outcome::kNotFound;
+  if (all_verdict.outcome != Outcome::kTrusted && !not_found) return;
+  *search = std::move(near);
+  const std::string delay = Seconds(search->fit.lag_s + s.offset_s);
+  if (not_found) {
+    *note =
+        "camera and gyro stamps do not overlap in time; with clocks of different origin they fit "
+        "at a delay of " +
+        delay;
+  } else if (std::abs(search->fit.lag_s - s.guess_lag_s) > options.search_s) {
+    *note = "within " + Seconds(options.search_s) +
+            " of the stamps nothing fits; with clocks of different origin they fit at a delay of " +
+            delay;
+  }
+  if (not_found && all_verdict.outcome != Outcome::kTrusted) {
+    all_verdict.reason = verdict->reason + " (camera starts " + Seconds(-s.offset_s) +
+                         " after the gyro, lasts " + Seconds(span_s) + ", the gyro " +
+                         Seconds(s.gyro_span_s) +
+                         "), nor with shifted clocks: " + all_verdict.reason;
+  }
+  *verdict = all_verdict;
+}
+
 }  // namespace
 
 Result<StartResult> FindStart(const Recording& recording,
@@ -171,70 +227,33 @@ Result<StartResult> FindStart(const Recording& recording,
                           Seconds(span_s) + ", expected at least " +
                           std::to_string(options.min_pairs) + " in " + Seconds(options.min_span_s));
   }
-  const double gyro_span_s = gyro.times_s.back();
   const double noise = std::sqrt(3.0) * gyro.Noise(span_s / camera.size());
-
-  // delay = lag + offset; a difference of integers, so that large stamps lose nothing.
+  // A difference of integers, so that large stamps lose nothing.
   const double offset_s =
       SecondsSince(recording.frames.front().stamp_ns, recording.gyro.front().stamp_ns);
   const double guess_lag_s = recording.camera.delay_s.value_or(0.0) +
                              0.5 * recording.camera.readout_s.value_or(0.0) - offset_s;
+  const double from_s = guess_lag_s - options.search_s, to_s = guess_lag_s + options.search_s;
 
-  const ClockRate rate =
-      FindClockRate(gyro, camera, guess_lag_s - options.search_s, guess_lag_s + options.search_s);
+  const ClockRate rate = FindClockRate(gyro, camera, from_s, to_s);
   if (rate.beyond_doubt) {
     camera = OnGyroClock(std::move(camera), rate.skew);
     first_s *= 1.0 + rate.skew;
     last_s *= 1.0 + rate.skew;
   }
-  const CameraRates liveliest = LiveliestStretch(camera, kMaxTemplatePairs);
-  const RateAlignment alignment(gyro, std::move(camera));
-
-  LagSearch search = SearchLag(alignment, guess_lag_s - options.search_s,
-                               guess_lag_s + options.search_s, options.min_pairs);
+  const double gyro_span_s = gyro.times_s.back();
+  const Streams streams{RateAlignment(std::move(gyro), std::move(camera)),
+                        first_s,
+                        last_s,
+                        gyro_span_s,
+                        offset_s,
+                        guess_lag_s,
+                        noise};
+  LagSearch search = SearchLag(streams.alignment, from_s, to_s, options.min_pairs);
   Verdict verdict = Judge(search, noise, offset_s, options);
   std::string note;
   if (verdict.outcome == Outcome::kNotFound || verdict.outcome == Outcome::kDoesNotFollow) {
-    // Clocks of different origin: every alignment with half of the shorter stream in the other.
-    const double overlap_s = 0.5 * std::min(span_s, gyro_span_s);
-    const RateAlignment reduced(gyro, liveliest);
-    const int min_pairs = std::max(options.min_pairs, liveliest.size() / 4);
-    const LagSearch all =
-        SearchLag(reduced, overlap_s - last_s, gyro_span_s - overlap_s - first_s, min_pairs);
-    Verdict all_verdict = Judge(all, noise, offset_s, options);
-    if (all.found) {
-      LagSearch near = SearchLag(alignment, all.fit.lag_s - options.search_s,
-                                 all.fit.lag_s + options.search_s, options.min_pairs);
-      if (all_verdict.outcome == Outcome::kTrusted) {
-        all_verdict = Judge(near, noise, offset_s, options);
-      }
-      if (near.runner_up_ratio < all.runner_up_ratio) {
-        near.runner_up_ratio = all.runner_up_ratio;
-        near.runner_up_lag_s = all.runner_up_lag_s;
-      }
-      // A refusal that names a cause, other than a bad fit, is better than none.
-      if (all_verdict.outcome == Outcome::kTrusted || verdict.outcome == Outcome::kNotFound) {
-        search = std::move(near);
-        if (verdict.outcome == Outcome::kNotFound) {
-          note =
-              "camera and gyro stamps do not overlap in time; with clocks of different origin they "
-              "fit at a delay of " +
-              Seconds(search.fit.lag_s + offset_s);
-        } else if (std::abs(search.fit.lag_s - guess_lag_s) > options.search_s) {
-          note = "within " + Seconds(options.search_s) +
-                 " of the stamps nothing fits; with clocks "
-                 "of different origin they fit at a delay of " +
-                 Seconds(search.fit.lag_s + offset_s);
-        }
-        if (verdict.outcome == Outcome::kNotFound && all_verdict.outcome != Outcome::kTrusted) {
-          all_verdict.reason = verdict.reason + " (camera starts " + Seconds(-offset_s) +
-                               " after the gyro, lasts " + Seconds(span_s) + ", the gyro " +
-                               Seconds(gyro_span_s) +
-                               "), nor with shifted clocks: " + all_verdict.reason;
-        }
-        verdict = all_verdict;
-      }
-    }
+    SearchAllAlignments(streams, options, &search, &verdict, &note);
   }
   if (verdict.outcome != Outcome::kTrusted) return CannotEstimate(verdict.reason);
 
