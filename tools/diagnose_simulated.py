@@ -45,13 +45,15 @@ def read(path):
 
 def as_fitted(truth, duration_s, recording):
     """The truth, with what the effects are said to shift: a gyro's filter delays by its time
-    constant, which is part of t_d; the bias is that of the middle if it drifts, and that under the
-    mean force if the gyro feels forces."""
+    constant, and stamps that are late by some mean latency make the camera seem earlier, both of
+    which is part of t_d; the bias is that of the middle if it drifts, and that under the mean
+    force if the gyro feels forces."""
     truth = copy.deepcopy(truth)
     values = {e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
               for e in truth["effects"]}
     delay = truth["clock"]["delay_s"]
     delay["value"] += values.get("gyro_lowpass", {}).get("time_constant", 0.0)
+    delay["value"] -= values.get("frame_stamp_jitter", {}).get("latency", 0.0)
     if "bias_drift" in values:
         bias = truth["gyro"]["bias_rad_s"]
         margin_s = read(SOURCE + "/tools/scenarios/default.yaml")["margin_s"]

@@ -198,6 +198,8 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
   std::mt19937_64 random = MakeRandom(scenario.seed, kFrameStream);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   std::normal_distribution<double> normal;
+  std::exponential_distribution<double> latency;
+  const FrameStampJitter& jitter = scenario.effects.frame_stamp_jitter;
   const int count = static_cast<int>(std::floor(scenario.duration_s * options.rate_hz)) + 1;
   for (int i = 0; i < count; ++i) {
     const double time_s = scenario.margin_s + i / options.rate_hz;  // first row, clean clock
@@ -205,7 +207,8 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
     const double swing = options.exposure_swing * std::sin(2.0 * M_PI * time_s / 5.0);
     const int64_t exposure_ns = std::llround(1e9 * options.exposure_s * (1.0 + swing));
     const double exposure_s = 1e-9 * static_cast<double>(exposure_ns);
-    const int64_t jitter_ns = std::llround(1e9 * options.stamp_jitter_s * normal(random));
+    const double late_s = jitter.latency_s > 0.0 ? jitter.latency_s * latency(random) : 0.0;
+    const int64_t jitter_ns = std::llround(1e9 * (jitter.spread_s * normal(random) + late_s));
     if (unit(random) < options.drop_fraction && i > 0 && i + 1 < count) continue;
 
     Frame frame;
@@ -216,7 +219,8 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
     }
     FrameTruth truth;
     truth.timing = result->camera->MakeFrame(SecondsSince(scenario.start_ns, stamp_ns), exposure_s);
-    truth.delay_s = result->camera->Delay(truth.timing);
+    truth.delay_s =
+        result->camera->Delay(truth.timing) - 1e-9 * static_cast<double>(frame.stamp_ns - stamp_ns);
     const double first_row_s = result->camera->ExposureTime(truth.timing, {0.0, 0.0});
     truth.focal_px = result->camera->Focal(first_row_s);
     const double position = std::clamp(first_row_s * scenario.gyro.rate_hz, 0.0,

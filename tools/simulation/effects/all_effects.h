@@ -13,6 +13,7 @@
 #include "tools/simulation/effects/exposure_delay.h"
 #include "tools/simulation/effects/exposure_lowpass.h"
 #include "tools/simulation/effects/focal_drift.h"
+#include "tools/simulation/effects/frame_stamp_jitter.h"
 #include "tools/simulation/effects/gyro_g_sensitivity.h"
 #include "tools/simulation/effects/gyro_lowpass.h"
 #include "tools/simulation/effects/gyro_misalignment.h"
@@ -36,6 +37,7 @@ struct Effects {
   ClockSkew clock_skew;
   DelayStep delay_step;
   DelayWander delay_wander;
+  FrameStampJitter frame_stamp_jitter;
   ReadoutDirection readout_direction;
   ReadoutNonlinear readout_nonlinear;
   GyroScale gyro_scale;
@@ -70,6 +72,7 @@ struct Effects {
     visit(self.clock_skew);
     visit(self.delay_step);
     visit(self.delay_wander);
+    visit(self.frame_stamp_jitter);
     visit(self.readout_direction);
     visit(self.readout_nonlinear);
     visit(self.gyro_scale);

@@ -2,16 +2,21 @@
 // listed in all_effects.h. (The simulator shares nothing with core/effects: the two must be able to
 // disagree.)
 //
-// A struct holds the effect's keys, at values that switch it off, and has
-//   static constexpr char kName[]         its section in a scenario's `effects:`, as the
-//   catalogue's void Read(Section* section)           template; keys of that section bool active()
-//   const                   switched on TruthParameters Truth() const         what truth.yaml says
-// and those of the following that it changes, each const and adding to what is there:
-//   void AddDelay(const FrameClock&, double* delay_s)
-//   void AddFocal(double time_s, double* focal_px)
-//   void AddRateMatrix(Eigen::Matrix3d* reading_by_rate)
-//   void AddRate(const RateInput&, Eigen::Vector3d* reading_rad_s)
-//   void AddBias(double time_s, Eigen::Vector3d* bias_rad_s)
+// A struct holds the effect's keys, at values that switch it off, and has these members:
+//
+// - static constexpr char kName[]: its section in a scenario's `effects:`, as in the catalogue;
+// - template <typename Section> void Read(Section* section): reads the keys of that section;
+// - bool active() const: is it switched on?
+// - TruthParameters Truth() const: what truth.yaml says of it.
+//
+// It also has those of the following that it changes, each const and adding to what is there:
+//
+// - void AddDelay(const FrameClock&, double* delay_s)
+// - void AddFocal(double time_s, double* focal_px)
+// - void AddRateMatrix(Eigen::Matrix3d* reading_by_rate)
+// - void AddRate(const RateInput&, Eigen::Vector3d* reading_rad_s)
+// - void AddBias(double time_s, Eigen::Vector3d* bias_rad_s)
+//
 // Lenses, filters, stabilisers and the order of readout are parts of the camera or the gyro
 // themselves (camera.cc, gyro.cc), which read the struct.
 #ifndef CAMGYRO_TOOLS_SIMULATION_EFFECTS_SIMULATED_EFFECT_H_
