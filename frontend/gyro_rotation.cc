@@ -5,15 +5,27 @@
 #include <limits>
 #include <utility>
 
+#include "core/gyro_gap.h"
 #include "core/lens.h"
 #include "core/pair_model.h"
+#include "core/robust_statistics.h"
 #include "core/time.h"
 
 namespace camgyro {
 namespace {
 
-constexpr double kMaxGyroGapS = 0.05;  // as in the estimators
-constexpr int kRowIterations = 3;      // the row of arrival decides over its own time
+constexpr int kRowIterations = 3;  // the row of arrival decides over its own time
+
+// The median interval of the samples around a pair; the others cost time and say the same.
+double IntervalAround(const std::vector<GyroSample>& gyro, size_t first, size_t last) {
+  constexpr size_t kAround = 25;
+  std::vector<double> intervals;
+  const size_t end = std::min(gyro.size(), last + kAround);
+  for (size_t i = std::max(first, kAround) - kAround; i + 1 < end; ++i) {
+    intervals.push_back(SecondsSince(gyro[i].stamp_ns, gyro[i + 1].stamp_ns));
+  }
+  return MedianOr(std::move(intervals), 0.0);
+}
 
 }  // namespace
 
@@ -35,13 +47,15 @@ std::optional<GyroRotation> GyroRotation::Between(const std::vector<GyroSample>&
   const auto end = std::upper_bound(begin, gyro.end(), StampAt(stamp_b_ns, last_s), after);
   if (begin == gyro.begin() || end == gyro.end()) return std::nullopt;
   --begin;
+  const double longest_step_s = LongestGyroStep(IntervalAround(
+      gyro, static_cast<size_t>(begin - gyro.begin()), static_cast<size_t>(end - gyro.begin())));
 
   std::vector<double> times_s;
   Eigen::Matrix3Xd omega(3, end - begin + 1);
   for (auto it = begin; it <= end; ++it) {
     omega.col(it - begin) = it->omega_gyro_rad_s - calibration.bias_gyro_rad_s;
     times_s.push_back(SecondsSince(stamp_a_ns, it->stamp_ns));
-    if (times_s.size() > 1 && times_s.back() - times_s[times_s.size() - 2] > kMaxGyroGapS) {
+    if (times_s.size() > 1 && times_s.back() - times_s[times_s.size() - 2] > longest_step_s) {
       return std::nullopt;
     }
   }

@@ -6,6 +6,7 @@
 
 #include "core/effects/catalogue.h"
 #include "core/format.h"
+#include "core/gyro_gap.h"
 #include "core/robust_statistics.h"
 #include "core/saturation.h"
 #include "core/so3.h"
@@ -109,7 +110,7 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
          "harmless if the stamps are right: check for a delay_step at these times", frames.count});
   }
   const Gaps samples = FindGaps(recording.gyro, origin_ns);
-  if (samples.longest_s > std::max(0.03, 5.0 * MedianInterval(recording.gyro))) {
+  if (samples.longest_s > LongestGyroStep(MedianInterval(recording.gyro))) {
     faults.push_back({"dropped_samples",
                       Format("%d gaps in the gyro's stamps, the longest of %.0f ms at %.2f s",
                              samples.count, 1e3 * samples.longest_s, samples.longest_at_s),

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/gyro_gap.h"
 #include "core/robust_statistics.h"
 #include "core/time.h"
 
@@ -36,7 +37,7 @@ RateAlignment::RateAlignment(GyroRates gyro, CameraRates camera)
   const size_t n = gyro_.times_s.size();
   std::vector<double> intervals;
   for (size_t k = 1; k < n; ++k) intervals.push_back(gyro_.times_s[k] - gyro_.times_s[k - 1]);
-  const double hole_s = std::max(kMaxGyroGapSamples * MedianOr(intervals, 0.0), kMaxGyroGapS);
+  const double hole_s = LongestGyroStep(MedianOr(intervals, 0.0));
 
   integral_ = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(n));
   gaps_.assign(n, 0);

@@ -38,10 +38,7 @@ struct CameraRates {
 //   t_gyro - (first gyro stamp) = t_camera - (first frame stamp) + lag
 class RateAlignment {
  public:
-  // Pairs with a hole in the gyro above this are left out.
-  static constexpr double kMaxGyroGapSamples = 5.0;  // median intervals
-  static constexpr double kMaxGyroGapS = 0.05;       // and this long
-
+  // Pairs with a hole in the gyro (core/gyro_gap.h) are left out.
   RateAlignment(GyroRates gyro, CameraRates camera);
 
   // Least squares over rotation, bias and one scale: w_gyro = scale * R_gyro_cam * w_cam + bias.

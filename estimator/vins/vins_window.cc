@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "core/gyro_gap.h"
 #include "core/pair_model.h"
 #include "core/time.h"
 
@@ -16,7 +17,6 @@ constexpr int kMinKeyframes = 4;
 constexpr size_t kMinTracks = 15;
 constexpr size_t kMinSightings = 3;  // two fix a point, the third tells whether it is right
 constexpr double kMarginS = 0.05;    // of inertial samples around the frames
-constexpr double kMaxGapS = 0.05;    // in the gyro samples
 
 template <typename Sample>
 bool StampsIncrease(const std::vector<Sample>& samples) {
@@ -130,8 +130,9 @@ Result<VinsWindow> MakeVinsWindow(const VinsInput& input, double interval_s) {
       window.keyframes.back().time_s + half_readout_s > window.imu.end_s()) {
     return CannotEstimate("the gyro samples do not cover the window's frames");
   }
+  const double longest_step_s = LongestGyroStep(MedianInterval(input.gyro));
   for (size_t i = 0; i + 1 < input.gyro.size(); ++i) {
-    if (SecondsSince(input.gyro[i].stamp_ns, input.gyro[i + 1].stamp_ns) > kMaxGapS) {
+    if (SecondsSince(input.gyro[i].stamp_ns, input.gyro[i + 1].stamp_ns) > longest_step_s) {
       return CannotEstimate("the gyro samples have a hole within the window");
     }
   }

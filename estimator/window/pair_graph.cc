@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/gyro_gap.h"
 #include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "estimator/window/pair_blocks.h"
@@ -22,8 +23,6 @@ namespace camgyro {
 namespace {
 
 // A gap of the gyro: longer than several sampling intervals.
-constexpr double kGapIntervals = 5.0;
-constexpr double kGapFloorS = 0.03;
 
 std::vector<double> Intervals(const std::deque<TimedRate>& samples) {
   std::vector<double> intervals;
@@ -178,9 +177,7 @@ AddPairResult PairGraph::CoverWithRates(double from_s, double to_s, int step,
   for (int64_t i = first; i < last; ++i) {
     const double gap = sample(i + 1).time_s - sample(i).time_s;
     if (sample(i).saturated || sample(i + 1).saturated) return AddPairResult::kGyroGap;
-    if (gap > std::max(kGapFloorS, kGapIntervals * median_interval_s_)) {
-      return AddPairResult::kGyroGap;
-    }
+    if (gap > LongestGyroStep(median_interval_s_)) return AddPairResult::kGyroGap;
   }
   // Groups that exist and reach into the span; then one new group with the rest.
   int64_t covered_until = first;  // first sample not yet covered

@@ -78,7 +78,7 @@ TEST(GyroRotationTest, NeedsTheGyroOverBothFrames) {
   EXPECT_FALSE(GyroRotation::Between(gyro, c, 4 * kSecond, 4 * kSecond + interval));
   EXPECT_FALSE(GyroRotation::Between(gyro, c, 6 * kSecond, 6 * kSecond + interval));
   EXPECT_FALSE(GyroRotation::Between({}, c, 5 * kSecond, 5 * kSecond + interval));
-  gyro.erase(gyro.begin() + 22, gyro.begin() + 34);  // 65 ms without samples
+  gyro.erase(gyro.begin() + 22, gyro.begin() + 28);  // 35 ms without samples: core/gyro_gap.h
   EXPECT_FALSE(GyroRotation::Between(gyro, c, 5 * kSecond, 5 * kSecond + interval));
 }
 
