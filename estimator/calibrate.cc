@@ -9,6 +9,7 @@
 
 #include "core/format.h"
 #include "core/so3.h"
+#include "core/usual_focal.h"
 
 namespace camgyro {
 namespace {
@@ -188,9 +189,7 @@ Prior MakePrior(const Recording& recording, const StartResult& start) {
   prior.distortion_model = guess.distortion_model;
   const Eigen::Vector2d centre(0.5 * (guess.width_px - 1), 0.5 * (guess.height_px - 1));
   const bool scanned = start.focal && start.focal->determined;
-  const double focal = guess.focal_px ? *guess.focal_px
-                       : scanned      ? start.focal->value_px
-                                      : 0.8 * std::max(guess.width_px, guess.height_px);
+  const double focal = scanned && !guess.focal_px ? start.focal->value_px : FocalToBeginWith(guess);
   prior.lens = MakePinhole(focal, guess.principal_px.value_or(centre), guess.aspect_ratio);
   for (size_t i = 0; i < guess.distortion.size() && i < 4; ++i) {
     prior.lens[FirstCoefficient(guess.distortion_model) + static_cast<int>(i)] =

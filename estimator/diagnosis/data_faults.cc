@@ -11,6 +11,7 @@
 #include "core/saturation.h"
 #include "core/so3.h"
 #include "core/time.h"
+#include "core/usual_focal.h"
 
 namespace camgyro {
 namespace {
@@ -217,7 +218,7 @@ std::optional<std::string> FindElectronicStabilisation(
 
 std::optional<DataFault> RepairGyro(const CameraRotationsAtFocal& rotations_at,
                                     const StartOptions& options, Recording* recording) {
-  const double focal = recording->camera.focal_px.value_or(0.8 * recording->camera.width_px);
+  const double focal = FocalToBeginWith(recording->camera);
   const std::vector<CameraRotation> rotations = rotations_at(focal);
   struct Repair {
     double scale;

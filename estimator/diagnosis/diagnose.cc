@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/usual_focal.h"
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
 
@@ -18,7 +19,7 @@ std::vector<CameraRotation> CameraRotationsIn(const Recording& recording,
     }
     return rotations;
   }
-  return rotations_at(recording.camera.focal_px.value_or(0.8 * recording.camera.width_px));
+  return rotations_at(FocalToBeginWith(recording.camera));
 }
 
 // Part of a progress: a stage's share of the whole.

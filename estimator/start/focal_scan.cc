@@ -8,6 +8,7 @@
 
 #include "core/robust_statistics.h"
 #include "core/time.h"
+#include "core/usual_focal.h"
 #include "estimator/start/clock_rate.h"
 #include "estimator/start/lag_search.h"
 #include "estimator/start/rate_alignment.h"
@@ -24,7 +25,6 @@ constexpr double kDistinctLog = 0.22;    // 25 %
 constexpr double kMaxRunnerUp = 0.8;     // a wrong lens moves shallow minima far
 constexpr double kModelLog = 0.02;       // rotations of pictures neglect rolling shutter and lens
 constexpr double kUnknownLog = 0.3;      // what is known of any lens
-constexpr double kUsualFocal = 0.85;     // of the longer side
 constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
 
 struct ScanPoint {
@@ -105,7 +105,7 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
     points[k].rotations = rotations_at(std::exp(points[k].log_focal));
     order.push_back(k);
   }
-  const double log_guess = std::log(recording.camera.focal_px.value_or(kUsualFocal * side_px));
+  const double log_guess = std::log(FocalToBeginWith(recording.camera));
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return std::abs(points[a].log_focal - log_guess) < std::abs(points[b].log_focal - log_guess);
   });

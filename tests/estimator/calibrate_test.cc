@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "core/usual_focal.h"
 #include "frontend/camera_rotations.h"
 #include "tests/estimator/simulated_input.h"
 
@@ -163,6 +164,9 @@ TEST(MakePrior, FollowsWhatTheFilesDeclare) {
   EXPECT_NEAR(found.sigma[kStateCx], 0.02 * 865.3, 0.01);
   EXPECT_NEAR(found.mean.readout_s, 1.0 / 60, 1e-6);
   EXPECT_NEAR(found.mean.delay_s, 0.031 - 1.0 / 120, 1e-6);
+
+  start.focal->determined = false;
+  EXPECT_EQ(MakePrior(s.recording, start).mean.lens[kFocal], kUsualFocal * 720);
 }
 
 }  // namespace
