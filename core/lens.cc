@@ -91,14 +91,32 @@ class AxialLens final : public Lens {
     }
     if (!xy.allFinite()) return false;
 
-    const double x = xy.x(), y = xy.y(), r2 = xy.squaredNorm();
-    out->ray << x, y, 1.0;
+    out->ray << xy, 1.0;
     out->J_ray_px.topRows<2>() = d.J.inverse() * Eigen::Vector2d(1.0 / fx, 1.0 / f).asDiagonal();
     out->J_ray_px.row(2).setZero();
     out->num_lens = by_lens == LensDerivatives::kAll ? kLensSize : kAspect;
     if (by_lens == LensDerivatives::kNone) out->num_lens = 0;
-    if (out->num_lens == 0) return true;
+    if (out->num_lens > 0) DifferentiateByLens(xy, distorted, d, lens, out);
+    return true;
+  }
 
+  std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& point_cam,
+                                         const LensParameters& lens) const override {
+    if (!(point_cam.z() > 0.0)) return std::nullopt;
+    const Eigen::Vector2d xy = point_cam.head<2>() / point_cam.z();
+    const Distortion d = Distort(xy, lens);
+    if (!IsInvertible(d, xy)) return std::nullopt;
+    return Eigen::Vector2d(lens[kFocal] * lens[kAspect] * d.value.x() + lens[kCx],
+                           lens[kFocal] * d.value.y() + lens[kCy]);
+  }
+
+ private:
+  // Derivatives of the ray of a pixel and of its J_ray_px by the first out->num_lens parameters.
+  // xy: undistorted, `distorted`: normalised coordinates; d: of the distortion at xy.
+  static void DifferentiateByLens(const Eigen::Vector2d& xy, const Eigen::Vector2d& distorted,
+                                  const Distortion& d, const LensParameters& lens, RayJet* out) {
+    const double f = lens[kFocal], aspect = lens[kAspect], fx = f * aspect;
+    const double x = xy.x(), y = xy.y(), r2 = xy.squaredNorm();
     const double p1 = lens[kP1], p2 = lens[kP2];
     const double slope = d.radial.slope, curvature = d.radial.curvature;
     const Eigen::Matrix2d J_inv = d.J.inverse();
@@ -126,7 +144,7 @@ class AxialLens final : public Lens {
     distorted_by(0, kAspect) = -distorted.x() / aspect;
     Eigen::Matrix<double, 2, kLensSize> value_by = Eigen::Matrix<double, 2, kLensSize>::Zero();
     std::array<Radial, 4> series;
-    if (by_lens == LensDerivatives::kAll) {
+    if (out->num_lens == kLensSize) {
       series = AngleSeries(AngleOverRadius(r2), r2);
       value_by.col(kK1) = xy * r2;
       value_by.col(kK2) = xy * r2 * r2;
@@ -153,20 +171,8 @@ class AxialLens final : public Lens {
       out->J_ray_px_lens[k].row(2).setZero();
       out->J_ray_px_lens[k].topRows<2>() = J_inv * (scale_k - J_k * J_inv * scale);
     }
-    return true;
   }
 
-  std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& point_cam,
-                                         const LensParameters& lens) const override {
-    if (!(point_cam.z() > 0.0)) return std::nullopt;
-    const Eigen::Vector2d xy = point_cam.head<2>() / point_cam.z();
-    const Distortion d = Distort(xy, lens);
-    if (!IsInvertible(d, xy)) return std::nullopt;
-    return Eigen::Vector2d(lens[kFocal] * lens[kAspect] * d.value.x() + lens[kCx],
-                           lens[kFocal] * d.value.y() + lens[kCy]);
-  }
-
- private:
   Distortion Distort(const Eigen::Vector2d& xy, const LensParameters& lens) const {
     const double k1 = lens[kK1], k2 = lens[kK2], p1 = lens[kP1], p2 = lens[kP2];
     const double x = xy.x(), y = xy.y(), r2 = xy.squaredNorm();
