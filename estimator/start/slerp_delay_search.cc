@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "core/rotation_chain.h"
@@ -26,6 +27,19 @@ double SquaredAngle(const Eigen::Quaterniond& q_gyro_a_b, const Eigen::Quaternio
   // Eq. (2): gamma_b * (q_c gamma_c q_c^-1)^-1, the identity without error.
   return Log(q_gyro_a_b * (q_gyro_cam * q_cam_a_b * q_gyro_cam.conjugate()).conjugate())
       .squaredNorm();
+}
+
+// Where the parabola through the least point of a curve and its neighbours is least; nothing where
+// that point is at the edge.
+std::optional<double> MinimumOf(const std::vector<SlerpDelayPoint>& curve, double step_s) {
+  const auto best = std::min_element(curve.begin(), curve.end(),
+                                     [](const SlerpDelayPoint& x, const SlerpDelayPoint& y) {
+                                       return x.mean_square_rad2 < y.mean_square_rad2;
+                                     });
+  if (best == curve.begin() || best + 1 == curve.end()) return std::nullopt;
+  const double before = (best - 1)->mean_square_rad2, after = (best + 1)->mean_square_rad2;
+  const double bend = before - 2.0 * best->mean_square_rad2 + after;
+  return best->delay_s + (bend > 0.0 ? 0.5 * (before - after) / bend : 0.0) * step_s;
 }
 
 }  // namespace
@@ -111,18 +125,12 @@ Result<SlerpDelay> SlerpDelaySearch(const Recording& recording,
     result.curve.push_back({options.centre_s + delay_s, sum / static_cast<double>(terms.size())});
   }
 
-  const auto best = std::min_element(result.curve.begin(), result.curve.end(),
-                                     [](const SlerpDelayPoint& x, const SlerpDelayPoint& y) {
-                                       return x.mean_square_rad2 < y.mean_square_rad2;
-                                     });
-  if (best == result.curve.begin() || best + 1 == result.curve.end()) {
+  const std::optional<double> delay_s = MinimumOf(result.curve, options.step_s);
+  if (!delay_s) {
     return CannotEstimate("delay search: no minimum inside +-" + std::to_string(options.range_s) +
                           " s, the residual is least at the edge");
   }
-  const double before = (best - 1)->mean_square_rad2, after = (best + 1)->mean_square_rad2;
-  const double bend = before - 2.0 * best->mean_square_rad2 + after;
-  result.delay_s =
-      best->delay_s + (bend > 0.0 ? 0.5 * (before - after) / bend : 0.0) * options.step_s;
+  result.delay_s = *delay_s;
   return result;
 }
 

@@ -112,6 +112,39 @@ double SystematicFraction(const std::vector<Linearized>& lines, const Eigen::Vec
   return std::clamp(correlation, 0.0, 1.0) * squares / sum_w / power;
 }
 
+// The larger of the classical covariance and the sandwich over blocks of consecutive pairs, per
+// parameter; a systematic residual widens orientation and bias besides.
+StartFit::Covariance CovarianceOf(const CameraRates& camera, const std::vector<Linearized>& lines,
+                                  const StartFit& fit, const StartFit::Covariance& normal,
+                                  double unit_variance) {
+  using Vector = Eigen::Matrix<double, kSize, 1>;
+  using Matrix = StartFit::Covariance;
+  const Eigen::VectorXd& weight = camera.weight;
+  const Matrix inverse = normal.ldlt().solve(Matrix::Identity());
+  const Matrix classical = unit_variance * inverse;
+  // Sandwich over blocks of consecutive pairs.
+  const int blocks = std::clamp(camera.size() / kMinPairsPerBlock, 1, kBlocks);
+  Matrix meat = Matrix::Zero();
+  for (int block = 0; block < blocks; ++block) {
+    Vector score = Vector::Zero();
+    const int end = (block + 1) * camera.size() / blocks;
+    for (int i = block * camera.size() / blocks; i < end; ++i) {
+      if (lines[i].covered) {
+        score += weight[i] * fit.robust_weight[i] * lines[i].J.transpose() * lines[i].residual;
+      }
+    }
+    meat += score * score.transpose();
+  }
+  const Matrix sandwich = (blocks > 1 ? blocks / (blocks - 1.0) : 0.0) * inverse * meat * inverse;
+  Vector variance = sandwich.diagonal().cwiseMax(classical.diagonal());
+  const double systematic = SystematicFraction(lines, weight, fit.robust_weight);
+  const double systematic_sq = systematic * systematic;
+  variance.segment<3>(1).array() += systematic_sq;
+  variance.segment<3>(4).array() += systematic_sq * GyroPower(lines, weight, fit.robust_weight);
+  const Vector stretch = (variance.array() / classical.diagonal().array()).sqrt();
+  return stretch.asDiagonal() * classical * stretch.asDiagonal();
+}
+
 }  // namespace
 
 StartFit FitStart(const RateAlignment& alignment, double lag_s,
@@ -183,29 +216,7 @@ StartFit FitStart(const RateAlignment& alignment, double lag_s,
   // Along a direction that hardly anything excites, steps shrink slowly; they no longer matter.
   fit.converged = fit.converged || decrement < kHarmlessDecrement;
 
-  const Matrix inverse = normal.ldlt().solve(Matrix::Identity());
-  const Matrix classical = unit_variance * inverse;
-  // Sandwich over blocks of consecutive pairs.
-  const int blocks = std::clamp(camera.size() / kMinPairsPerBlock, 1, kBlocks);
-  Matrix meat = Matrix::Zero();
-  for (int block = 0; block < blocks; ++block) {
-    Vector score = Vector::Zero();
-    const int end = (block + 1) * camera.size() / blocks;
-    for (int i = block * camera.size() / blocks; i < end; ++i) {
-      if (lines[i].covered) {
-        score += weight[i] * fit.robust_weight[i] * lines[i].J.transpose() * lines[i].residual;
-      }
-    }
-    meat += score * score.transpose();
-  }
-  const Matrix sandwich = (blocks > 1 ? blocks / (blocks - 1.0) : 0.0) * inverse * meat * inverse;
-  Vector variance = sandwich.diagonal().cwiseMax(classical.diagonal());
-  const double systematic = SystematicFraction(lines, weight, fit.robust_weight);
-  const double systematic_sq = systematic * systematic;
-  variance.segment<3>(1).array() += systematic_sq;
-  variance.segment<3>(4).array() += systematic_sq * GyroPower(lines, weight, fit.robust_weight);
-  const Vector stretch = (variance.array() / classical.diagonal().array()).sqrt();
-  fit.covariance = stretch.asDiagonal() * classical * stretch.asDiagonal();
+  fit.covariance = CovarianceOf(camera, lines, fit, normal, unit_variance);
   return fit;
 }
 
