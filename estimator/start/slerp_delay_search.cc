@@ -29,6 +29,25 @@ double SquaredAngle(const Eigen::Quaterniond& q_gyro_a_b, const Eigen::Quaternio
       .squaredNorm();
 }
 
+// The camera's intervals that stay inside for every delay of the range: a constant number of terms.
+std::vector<size_t> IntervalsInside(const std::vector<double>& times_s,
+                                    const std::vector<double>& gyro_times_s,
+                                    const SlerpOptions& options) {
+  const bool move_camera = options.reference == SlerpReference::kGyro;
+  const double begin_s = move_camera ? times_s.front() : gyro_times_s.front();
+  const double end_s = move_camera ? times_s.back() : gyro_times_s.back();
+  std::vector<size_t> inside;
+  for (size_t k = 0; k + 1 < times_s.size(); ++k) {
+    const bool gyro_covers =
+        times_s[k] >= gyro_times_s.front() && times_s[k + 1] <= gyro_times_s.back();
+    if (times_s[k] - options.range_s >= begin_s && times_s[k + 1] + options.range_s <= end_s &&
+        (gyro_covers || !move_camera)) {
+      inside.push_back(k);
+    }
+  }
+  return inside;
+}
+
 // Where the parabola through the least point of a curve and its neighbours is least; nothing where
 // that point is at the edge.
 std::optional<double> MinimumOf(const std::vector<SlerpDelayPoint>& curve, double step_s) {
@@ -81,20 +100,9 @@ Result<SlerpDelay> SlerpDelaySearch(const Recording& recording,
     return Eigen::Quaterniond(chain.At(time_s).R_ref_gyro);
   };
 
-  // A constant number of terms: intervals that stay inside for every delay of the range.
   const bool move_camera = options.reference == SlerpReference::kGyro;
-  const double begin_s = move_camera ? times_s.front() : gyro.times_s.front();
-  const double end_s = move_camera ? times_s.back() : gyro.times_s.back();
-  std::vector<size_t> terms;
+  const std::vector<size_t> terms = IntervalsInside(times_s, gyro.times_s, options);
   std::vector<Eigen::Quaterniond> q_gyro_fixed;  // at the stamps themselves
-  for (size_t k = 0; k + 1 < times_s.size(); ++k) {
-    const bool gyro_covers =
-        times_s[k] >= gyro.times_s.front() && times_s[k + 1] <= gyro.times_s.back();
-    if (times_s[k] - options.range_s >= begin_s && times_s[k + 1] + options.range_s <= end_s &&
-        (gyro_covers || !move_camera)) {
-      terms.push_back(k);
-    }
-  }
   if (terms.size() < 2) {
     return CannotEstimate("delay search: window or gyro too short for +-" +
                           std::to_string(options.range_s) + " s: no interval stays inside");

@@ -59,6 +59,38 @@ VinsStart Refuse(const VinsStart& so_far, VinsVerdict verdict, std::string expla
   return start;
 }
 
+// What a refined start is worth.
+Result<VinsStart> Judge(VinsStart start, const VinsOptions& options) {
+  if (start.inlier_ratio < kMinInlierRatio ||
+      start.noise_px > kMaxNoiseRad * start.calibration.lens[kFocal]) {
+    return Refuse(
+        start, VinsVerdict::kCalibrationImplausible,
+        Format("%.0f %% of the tracked points agree with the gyro's rotations, to %.1f px: "
+               "wrong delay, mounting, lens or readout time?",
+               100.0 * start.inlier_ratio, start.noise_px));
+  }
+  if (start.accel_noise_factor > kMaxAccelNoiseFactor) {
+    return Refuse(
+        start, VinsVerdict::kAccelerometerImplausible,
+        Format("the accelerometer contradicts camera and gyro %.0f times beyond its noise: "
+               "wrong axes, scale, clock, or calibration",
+               start.accel_noise_factor));
+  }
+  if (!(start.scale_sigma <= options.ready_scale) ||
+      !(start.gravity_sigma_rad <= options.ready_gravity_rad)) {
+    const std::string explanation =
+        Format("known so far: scale to %.1f %%, gravity to %.2f deg; wanted: %.1f %%, %.2f deg",
+               100.0 * start.scale_sigma, start.gravity_sigma_rad * 180.0 / M_PI,
+               100.0 * options.ready_scale, options.ready_gravity_rad * 180.0 / M_PI);
+    return Refuse(start, VinsVerdict::kImprecise, explanation);
+  }
+  start.verdict = VinsVerdict::kReady;
+  start.explanation =
+      Format("scale to %.1f %%, gravity to %.2f deg, %d landmarks", 100.0 * start.scale_sigma,
+             start.gravity_sigma_rad * 180.0 / M_PI, static_cast<int>(start.landmarks.size()));
+  return start;
+}
+
 }  // namespace
 
 std::string VinsVerdictName(VinsVerdict verdict) {
@@ -158,34 +190,7 @@ Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& opti
   }
   start.inlier_ratio =
       static_cast<double>(start.observations) / static_cast<double>(window->observations.size());
-  if (start.inlier_ratio < kMinInlierRatio ||
-      start.noise_px > kMaxNoiseRad * start.calibration.lens[kFocal]) {
-    return Refuse(
-        start, VinsVerdict::kCalibrationImplausible,
-        Format("%.0f %% of the tracked points agree with the gyro's rotations, to %.1f px: "
-               "wrong delay, mounting, lens or readout time?",
-               100.0 * start.inlier_ratio, start.noise_px));
-  }
-  if (start.accel_noise_factor > kMaxAccelNoiseFactor) {
-    return Refuse(
-        start, VinsVerdict::kAccelerometerImplausible,
-        Format("the accelerometer contradicts camera and gyro %.0f times beyond its noise: "
-               "wrong axes, scale, clock, or calibration",
-               start.accel_noise_factor));
-  }
-  if (!(start.scale_sigma <= options.ready_scale) ||
-      !(start.gravity_sigma_rad <= options.ready_gravity_rad)) {
-    const std::string explanation =
-        Format("known so far: scale to %.1f %%, gravity to %.2f deg; wanted: %.1f %%, %.2f deg",
-               100.0 * start.scale_sigma, start.gravity_sigma_rad * 180.0 / M_PI,
-               100.0 * options.ready_scale, options.ready_gravity_rad * 180.0 / M_PI);
-    return Refuse(start, VinsVerdict::kImprecise, explanation);
-  }
-  start.verdict = VinsVerdict::kReady;
-  start.explanation =
-      Format("scale to %.1f %%, gravity to %.2f deg, %d landmarks", 100.0 * start.scale_sigma,
-             start.gravity_sigma_rad * 180.0 / M_PI, static_cast<int>(start.landmarks.size()));
-  return start;
+  return Judge(std::move(start), options);
 }
 
 }  // namespace camgyro
