@@ -148,10 +148,7 @@ void BindCalibration(py::module_* module) {
           "dict name -> bool: did the motion determine it?");
 }
 
-}  // namespace
-
-void BindResults(py::module_* module) {
-  BindCalibration(module);
+void BindReport(py::module_* module) {
   py::class_<CalibrationReport>(*module, "CalibrationReport")
       .def_readonly("calibration", &CalibrationReport::calibration)
       .def_readonly("notes", &CalibrationReport::notes, "list of str")
@@ -189,7 +186,9 @@ void BindResults(py::module_* module) {
               "Calibrates a recording; pictures are tracked first, and their tracks stay in it. "
               "refine=False: only the online pass. Raises camgyro.Error, code 4, with the reason "
               "if the data do not determine a calibration.");
+}
 
+void BindVins(py::module_* module) {
   py::class_<VinsStart>(*module, "VinsStart",
                         "World: origin and axes of the gyro frame at the first keyframe.")
       .def_property_readonly(
@@ -249,6 +248,14 @@ void BindResults(py::module_* module) {
               py::arg("accel_noise_m_s2_rtHz") = ImuNoise().accel_m_s2_rtHz,
               "Starts a VIO on the frames from first_s to first_s + window_s [s after the first "
               "frame]. The recording needs tracks (calibrate makes them) and an accelerometer.");
+}
+
+}  // namespace
+
+void BindResults(py::module_* module) {
+  BindCalibration(module);
+  BindReport(module);
+  BindVins(module);
 }
 
 }  // namespace camgyro
