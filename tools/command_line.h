@@ -43,9 +43,6 @@ bool FlagGiven(const char* name);
 std::string CommandLineOf(const Command& command, const std::vector<std::string>& arguments);
 std::vector<std::pair<std::string, std::string>> FlagValues(const Command& command);
 
-// The known name that `name` was probably meant to be, or nothing.
-std::string NearestName(const std::string& name, const std::vector<std::string>& known);
-
 }  // namespace camgyro
 
 #endif  // CAMGYRO_TOOLS_COMMAND_LINE_H_

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/nearest_name.h"
 #include "frontend/readers/formats.h"
 #include "tools/commands.h"
 

@@ -16,13 +16,6 @@ using testing::Not;
 
 using CommandLineTest = CamgyroTest;
 
-TEST_F(CommandLineTest, NearestNameForgivesTypingErrorsOnly) {
-  const std::vector<std::string> known = {"calibrate", "delay", "track"};
-  EXPECT_EQ(NearestName("calibarte", known), "calibrate");
-  EXPECT_EQ(NearestName("trak", known), "track");
-  EXPECT_EQ(NearestName("stabilise", known), "");
-}
-
 TEST_F(CommandLineTest, BadUsageIsTwoAndSaysWhat) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"", "no command given"},

@@ -5,13 +5,13 @@
 #include <random>
 #include <utility>
 
+#include "core/nearest_name.h"
 #include "core/time.h"
 #include "estimator/calibrate.h"
 #include "estimator/reference/implicit_ekf.h"
 #include "frontend/readers/read_recording.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/run.h"
-#include "tools/command_line.h"
 #include "tools/simulation/simulate.h"
 
 namespace camgyro::comparison {

@@ -1,27 +1,10 @@
 #include "tools/simulation/yaml_section.h"
 
 #include <algorithm>
-#include <numeric>
+
+#include "core/nearest_name.h"
 
 namespace camgyro::simulation {
-namespace {
-
-// Levenshtein's distance.
-int EditDistance(const std::string& a, const std::string& b) {
-  std::vector<int> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (size_t i = 1; i <= a.size(); ++i) {
-    int diagonal = std::exchange(row[0], static_cast<int>(i));
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const int replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, replaced}));
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
-
 YamlSection::YamlSection(const YAML::Node& node, std::string name, std::string* complaint)
     : node_(node), name_(std::move(name)), complaint_(complaint) {
   if (node_.IsDefined() && !node_.IsNull() && !node_.IsMap()) {
@@ -57,7 +40,7 @@ std::string YamlSection::Suggestion(const std::string& word,
         return EditDistance(word, a) < EditDistance(word, b);
       });
   if (nearest == known.end()) return "";
-  if (EditDistance(word, *nearest) <= static_cast<int>(nearest->size()) / 2) {
+  if (EditDistance(word, *nearest) <= nearest->size() / 2) {
     return "; did you mean " + *nearest + "?";
   }
   std::string all;
