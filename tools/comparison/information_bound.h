@@ -1,4 +1,4 @@
-// What two-view coplanarity can tell at best: the Cramer-Rao bound of the benchmark.
+// What two-view coplanarity can tell at best: the Cramer-Rao bound.
 #ifndef CAMGYRO_TOOLS_COMPARISON_INFORMATION_BOUND_H_
 #define CAMGYRO_TOOLS_COMPARISON_INFORMATION_BOUND_H_
 

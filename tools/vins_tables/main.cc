@@ -1,4 +1,4 @@
-// vins_benchmark: the tables of docs/lab/vins.md.
+// vins_tables: the tables of docs/lab/vins.md.
 #include <gflags/gflags.h>
 #include <glog/logging.h>
 
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/run.h"
-#include "tools/benchmark/benchmark.h"
+#include "tools/vins_tables/vins_tables.h"
 
 DEFINE_string(what, "initialisation", "initialisation, or delay: Feng's search over a recording");
 DEFINE_string(simulate, "walking,running,handheld", "motions to simulate, comma-separated");
@@ -29,14 +29,14 @@ std::vector<std::string> Split(const std::string& list) {
   return words;
 }
 
-Status Benchmark(const BenchmarkRecording& r) {
+Status Tabulate(const RecordingWithTruth& r) {
   const Result<CalibrationReport> report =
       CalibrateRecording(r.recording, RotationsFrom(r.recording), {});
   if (!report) return tl::unexpected(report.error());
   if (FLAGS_what == "delay") {
-    return BenchmarkDelaySearch(r.name, r.recording, report->calibration, FLAGS_curves);
+    return TabulateDelaySearch(r.name, r.recording, report->calibration, FLAGS_curves);
   }
-  BenchmarkInitialisation(r, report->calibration, FLAGS_step_s);
+  TabulateInitialisation(r, report->calibration, FLAGS_step_s);
   return {};
 }
 
@@ -57,18 +57,18 @@ Status Run(const std::vector<std::string>& paths) {
   for (const std::string& motion : Split(FLAGS_simulate)) {
     for (int seed = 1; seed <= FLAGS_seeds; ++seed) {
       const auto recording =
-          SimulateForBenchmark(motion + " " + std::to_string(seed),
-                               {"motion.kind=" + motion, "seed=" + std::to_string(seed),
-                                "duration_s=" + std::to_string(FLAGS_duration_s),
-                                "camera.delay_s=0.03", "tracks.noise_px=0.5"});
+          SimulateWithTruth(motion + " " + std::to_string(seed),
+                            {"motion.kind=" + motion, "seed=" + std::to_string(seed),
+                             "duration_s=" + std::to_string(FLAGS_duration_s),
+                             "camera.delay_s=0.03", "tracks.noise_px=0.5"});
       if (!recording) return tl::unexpected(recording.error());
-      if (Status done = Benchmark(*recording); !done) return done;
+      if (Status done = Tabulate(*recording); !done) return done;
     }
   }
   for (const std::string& path : paths) {
-    const auto recording = ReadForBenchmark(path);
+    const auto recording = ReadWithTruth(path);
     if (!recording) return tl::unexpected(recording.error());
-    if (Status done = Benchmark(*recording); !done) return done;
+    if (Status done = Tabulate(*recording); !done) return done;
   }
   return {};
 }
@@ -85,6 +85,6 @@ int main(int argc, char** argv) {
   gflags::ParseCommandLineFlags(&argc, &argv, /*remove_flags=*/true);
   const camgyro::Status status = camgyro::Run({argv + 1, argv + argc});
   if (status) return 0;
-  std::fprintf(stderr, "vins_benchmark: %s\n", status.error().message.c_str());
+  std::fprintf(stderr, "vins_tables: %s\n", status.error().message.c_str());
   return static_cast<int>(status.error().kind);
 }

@@ -1,4 +1,4 @@
-// Times of what an estimator does most: camgyro_benchmarks [--benchmark_filter=REGEX].
+// Times of what an estimator does most: camgyro_timing [--benchmark_filter=REGEX].
 // One pair of frames has 100 matches and some 15 rates (200 Hz, 30 frames/s, 20 ms readout).
 #include <benchmark/benchmark.h>
 #include <glog/logging.h>

@@ -5,7 +5,7 @@
 #include "core/robust_statistics.h"
 #include "core/time.h"
 #include "estimator/start/slerp_delay_search.h"
-#include "tools/benchmark/benchmark.h"
+#include "tools/vins_tables/vins_tables.h"
 
 namespace camgyro {
 namespace {
@@ -20,8 +20,8 @@ void AppendCurve(const std::string& name, const char* reference, double window_s
 
 }  // namespace
 
-Status BenchmarkDelaySearch(const std::string& name, const Recording& recording,
-                            const Calibration& calibrated, const std::string& curves_csv) {
+Status TabulateDelaySearch(const std::string& name, const Recording& recording,
+                           const Calibration& calibrated, const std::string& curves_csv) {
   std::FILE* file = nullptr;
   if (!curves_csv.empty()) {
     file = std::fopen(curves_csv.c_str(), "a");

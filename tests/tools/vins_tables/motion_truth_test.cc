@@ -1,10 +1,10 @@
 // The reference that stands in for the truth where only the calibration is known.
-#include "tools/benchmark/motion_truth.h"
+#include "tools/vins_tables/motion_truth.h"
 
 #include <gmock/gmock.h>
 
 #include "core/time.h"
-#include "tools/benchmark/benchmark.h"
+#include "tools/vins_tables/vins_tables.h"
 
 namespace camgyro {
 namespace {
@@ -21,7 +21,7 @@ Seen Between(const MotionTruth::Stretch& at, int64_t from_ns, int64_t to_ns) {
 }
 
 TEST(FittedTruth, AgreesWithTheSimulation) {
-  const auto r = SimulateForBenchmark(
+  const auto r = SimulateWithTruth(
       "walk", {"motion.kind=walking", "duration_s=12.5", "tracks.noise_px=0.3", "tracks.count=60"});
   ASSERT_TRUE(r) << r.error().message;
   double sigma_m_s = 0.0;

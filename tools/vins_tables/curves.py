@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """curves.py CURVES.csv: how sharp the minimum of Feng's search is.
 
-Reads what `vins_benchmark --what=delay --curves=CURVES.csv` wrote; prints, for each recording and
+Reads what `vins_tables --what=delay --curves=CURVES.csv` wrote; prints, for each recording and
 reference, the residual (root mean square angle, median over the windows) at delays off the
 window's own minimum, in mrad.
 """

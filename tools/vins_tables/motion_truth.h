@@ -1,6 +1,6 @@
-// Where the gyro frame really was: what the benchmark compares with.
-#ifndef CAMGYRO_TOOLS_BENCHMARK_MOTION_TRUTH_H_
-#define CAMGYRO_TOOLS_BENCHMARK_MOTION_TRUTH_H_
+// Where the gyro frame really was: what the tables compare with.
+#ifndef CAMGYRO_TOOLS_VINS_TABLES_MOTION_TRUTH_H_
+#define CAMGYRO_TOOLS_VINS_TABLES_MOTION_TRUTH_H_
 
 #include <functional>
 #include <memory>
@@ -43,4 +43,4 @@ std::unique_ptr<MotionTruth> FittedTruth(const Recording& recording, const Calib
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_TOOLS_BENCHMARK_MOTION_TRUTH_H_
+#endif  // CAMGYRO_TOOLS_VINS_TABLES_MOTION_TRUTH_H_

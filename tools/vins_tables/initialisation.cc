@@ -7,7 +7,7 @@
 #include "core/imu_integral.h"
 #include "core/time.h"
 #include "estimator/start/slerp_delay_search.h"
-#include "tools/benchmark/benchmark.h"
+#include "tools/vins_tables/vins_tables.h"
 
 namespace camgyro {
 namespace {
@@ -37,7 +37,7 @@ double Quantile(const std::vector<Errors>& errors, double Errors::*which, double
 }
 
 // All in the world of the estimate: the gyro frame at the first keyframe.
-std::optional<Errors> ErrorsOf(const VinsStart& start, const BenchmarkRecording& r) {
+std::optional<Errors> ErrorsOf(const VinsStart& start, const RecordingWithTruth& r) {
   const int64_t end_ns = start.states.back().time_ns;
   const int64_t far_ns = StampAt(end_ns, kPropagationS);
   const auto truth = r.motion->Over(start.states.front().time_ns, far_ns);
@@ -91,7 +91,7 @@ Calibration WithDelay(const Calibration& calibrated, double delay_s) {
   return c;
 }
 
-void Add(const Result<VinsStart>& start, const BenchmarkRecording& r, Tally* tally) {
+void Add(const Result<VinsStart>& start, const RecordingWithTruth& r, Tally* tally) {
   if (!start || start->states.empty()) return;
   const bool ready = start->verdict == VinsVerdict::kReady;
   tally->ready += ready;
@@ -123,8 +123,8 @@ void Print(const std::string& name, const char* way, const Tally& t) {
 
 }  // namespace
 
-void BenchmarkInitialisation(const BenchmarkRecording& r, const Calibration& calibrated,
-                             double step_s) {
+void TabulateInitialisation(const RecordingWithTruth& r, const Calibration& calibrated,
+                            double step_s) {
   const std::vector<CameraRotation> rotations = NeighbourRotations(r.recording, calibrated);
   const int64_t begin_ns = r.recording.frames.front().stamp_ns;
   const double duration_s = SecondsSince(begin_ns, r.recording.frames.back().stamp_ns);

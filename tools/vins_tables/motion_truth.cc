@@ -1,4 +1,4 @@
-#include "tools/benchmark/motion_truth.h"
+#include "tools/vins_tables/motion_truth.h"
 
 #include <algorithm>
 #include <cmath>

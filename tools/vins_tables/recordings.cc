@@ -2,7 +2,7 @@
 #include "frontend/readers/read_recording.h"
 #include "frontend/two_view_rotation.h"
 #include "pipeline/read_calibration.h"
-#include "tools/benchmark/benchmark.h"
+#include "tools/vins_tables/vins_tables.h"
 
 namespace camgyro {
 namespace {
@@ -13,13 +13,13 @@ constexpr double kReferenceStepS = 2.0;
 
 }  // namespace
 
-Result<BenchmarkRecording> SimulateForBenchmark(const std::string& name,
-                                                const std::vector<std::string>& overrides) {
+Result<RecordingWithTruth> SimulateWithTruth(const std::string& name,
+                                             const std::vector<std::string>& overrides) {
   const auto scenario = simulation::ParseScenario("", overrides);
   if (!scenario) return tl::unexpected(scenario.error());
   auto simulated = simulation::SimulateTracks(*scenario);
   if (!simulated) return tl::unexpected(simulated.error());
-  BenchmarkRecording result;
+  RecordingWithTruth result;
   result.name = name;
   result.truth = simulated->truth;
   result.motion = SimulatedTruth(*simulated, *scenario);
@@ -33,12 +33,12 @@ Result<BenchmarkRecording> SimulateForBenchmark(const std::string& name,
   return result;
 }
 
-Result<BenchmarkRecording> ReadForBenchmark(const std::string& path) {
+Result<RecordingWithTruth> ReadWithTruth(const std::string& path) {
   Result<Recording> recording = ReadRecording(path);
   if (!recording) return tl::unexpected(recording.error());
   const Result<Calibration> truth = ReadCalibration(path + "/truth.yaml");
   if (!truth) return tl::unexpected(truth.error());
-  BenchmarkRecording result;
+  RecordingWithTruth result;
   const size_t slash = path.find_last_of('/');
   result.name = slash == std::string::npos ? path : path.substr(slash + 1);
   result.truth = *truth;
