@@ -91,6 +91,7 @@ struct GyroOptions {
   Eigen::Vector3d bias_rad_s = {0.01, -0.02, 0.015};
   double bias_walk_rad_s2_rtHz = 1e-5;
   bool averaged = false;        // samples are means over their interval
+  double stamp_jitter_s = 0.0;  // sigma; samples are even, stamps are not
   double drop_fraction = 0.0;
   double quantum_rad_s = 0.0;  // 0: none
   bool accelerometer = true;
