@@ -16,7 +16,7 @@ std::pair<double, double> ExposureSpan(const ShutterParameters& shutter,
     for (const Eigen::Vector2d& part : {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(1.0, 0.0),
                                         Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(1.0, 1.0)}) {
       const Eigen::Vector2d px = part.cwiseProduct(size_px);
-      double time_s = RowTimeGyroS(frame.stamp_s, shutter, part.y(), 1.0);
+      double time_s = RowTimeGyroS(frame.stamp_s + frame.offset_s, shutter, part.y(), 1.0);
       if (effects.set != nullptr) {
         effects.set->ChangeObservation({px, size_px, frame}, &change);
         time_s += change.time.row(0).dot(
@@ -51,7 +51,7 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
   b->row_fraction = px.y() / height_px;
   b->J_time_px << 0.0, shutter[kReadout] / height_px;
   LensParameters lens_here = lens;
-  double time_s = RowTimeGyroS(frame.stamp_s, shutter, px.y(), height_px);
+  double time_s = RowTimeGyroS(frame.stamp_s + frame.offset_s, shutter, px.y(), height_px);
   if (effects.set != nullptr) {
     effects.set->ChangeObservation({px, size_px, frame}, &b->change);
     const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
@@ -83,6 +83,19 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
 void Bearing::ScaleNoise(const Eigen::Vector3d& factor) {
   noise_factor << factor[0], 0.0, factor[1], factor[2];
   J_ray_px *= noise_factor;
+}
+
+double ByTime(const Bearing& b, const Eigen::Vector3d& by_ray,
+              const Eigen::Matrix<double, 3, 2>& by_J_ray_px) {
+  const Eigen::Vector3d by_phi = b.ray_ref.cross(by_ray) +
+                                 b.J_ray_px.col(0).cross(by_J_ray_px.col(0)) +
+                                 b.J_ray_px.col(1).cross(by_J_ray_px.col(1));
+  const Eigen::Vector3d by_J_time = b.R_ref_cam.transpose() *
+                                    (by_J_ray_px * b.noise_factor.transpose()) *
+                                    b.J_time_px.transpose();  // by omega x ray, camera frame
+  const Eigen::Vector3d by_omega =
+      b.rotation.R_ref_gyro.transpose() * (b.R_ref_cam * b.lens_ray.ray.cross(by_J_time));
+  return by_phi.dot(b.rotation.PhiPerSecond()) + by_omega.dot(b.rotation.alpha_gyro_rad_s2);
 }
 
 void Backpropagate(const Bearing& b, const RotationChain& chain, double height_px,

@@ -21,7 +21,8 @@ inline ShutterParameters ShutterOf(const Calibration& c) { return {c.readout_s, 
 
 // Time on the gyro clock at which row v_px is exposed, eq. (2):
 //   t_gyro = t_frame + t_d + t_r * v / h
-// frame_time_s: the frame's recorded stamp, seconds from the same origin as the gyro's times.
+// frame_time_s: the frame's recorded stamp, with its offset if it has a time of its own, seconds
+// from the same origin as the gyro's times.
 inline double RowTimeGyroS(double frame_time_s, const ShutterParameters& shutter, double v_px,
                            double height_px) {
   return frame_time_s + shutter[kDelay] + shutter[kReadout] * v_px / height_px;
@@ -86,6 +87,10 @@ struct PairGradient {
   return EvaluateBearing(lens_model, lens, shutter, R_gyro_cam, chain, FrameTime{frame_time_s},
                          Eigen::Vector2d(0.0, height_px), px, PairEffects(), bearing, by_lens);
 }
+
+// Derivative of a scalar by the time of exposure, given those by ray_ref and by J_ray_px.
+double ByTime(const Bearing& bearing, const Eigen::Vector3d& by_ray,
+              const Eigen::Matrix<double, 3, 2>& by_J_ray_px);
 
 // Adds to `gradient` and `by_rates` (3 x chain.size()) the derivative of a scalar, given its
 // derivatives by ray_ref and by J_ray_px of one bearing.

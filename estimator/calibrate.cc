@@ -291,6 +291,10 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
              !added) {
     return tl::unexpected(added.error());
   }
+  if (estimate.effects && estimate.effects->frame_time_spread() >= 0 &&
+      options.residual != ResidualKind::kPlane) {
+    return BadUsage("--effects: frames have times of their own with --residual=plane only");
+  }
   const PairGraphOptions graph_options = GraphOptionsFor(recording, *start, options);
   const Calibration from_start = estimate;
 
@@ -387,6 +391,7 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
     report.calibration = refined->calibration;
     report.quality = refined->quality;
     report.skipped_pairs = refined->skipped_pairs;
+    report.frame_times = refined->frame_times;
     report.converged = refined->converged;
     tell("refinement", 0.6);
     const Halves halves = halves_fit.valid() ? halves_fit.get() : Halves();

@@ -20,11 +20,14 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
   const ShutterParameters shutter = ShutterOf(calibration);
   PairView view;
   for (const TimedPair& pair : pairs) {
-    if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
+    const bool transfer = options.residual == ResidualKind::kSymmetricTransfer;
+    PairPlane plane;
+    if (!(transfer ? ViewPair(input, pair, calibration, noise_px, options, &view)
+                   : FitPair(input, pair, calibration, noise_px, options, &view, &plane))) {
+      continue;
+    }
     const PairBearings& bearings = view.bearings;
     if (bearings.a.size() < PairGraph::kMinMatches) continue;
-    const bool transfer = options.residual == ResidualKind::kSymmetricTransfer;
-    const PairPlane plane = transfer ? PairPlane() : FitPlane(view);
     const std::vector<double> transfers =
         transfer ? TransferResiduals(view, calibration) : std::vector<double>();
     const double sigma_of_two_px =

@@ -41,6 +41,8 @@ CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
   set_num_residuals(static_cast<int>(pair_->matches.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3, 6};
   if (pair_->effects) mutable_parameter_block_sizes()->push_back(pair_->effects->size());
+  mutable_parameter_block_sizes()->resize(
+      parameter_block_sizes().size() + static_cast<size_t>(NumTimeBlocks(*pair_)), 1);
   for (size_t g = 0; g < pair_->rate_group_sizes.size(); ++g) {
     mutable_parameter_block_sizes()->push_back(3 * pair_->num_rate_values(g));
   }
@@ -49,11 +51,13 @@ CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
 bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residuals,
                                 double** jacobians) const {
   const PairMeasurement& pair = *pair_;
-  const int first_rate_group = kEffectsBlock + NumEffectBlocks(pair);
+  const int times_block = kEffectsBlock + NumEffectBlocks(pair);
+  const int first_rate_group = times_block + NumTimeBlocks(pair);
   const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + first_rate_group);
   const RotationChain chain(pair.rate_times_s, rates);
   const BearingsOfMatch bearings(pair, chain, parameters[0], parameters[1], parameters[2],
-                                 pair.effects ? parameters[kEffectsBlock] : nullptr);
+                                 pair.effects ? parameters[kEffectsBlock] : nullptr,
+                                 pair.own_times ? parameters + times_block : nullptr);
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
   const Eigen::Map<const Eigen::Matrix<double, 3, 2>> bend(parameters[kBendBlock]);
   PairRow row(chain.size());
@@ -72,6 +76,11 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
     row.Add(b, chain, pair.size_px.y(), r.by_b, r.by_J_b);
     row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair, first_rate_group,
               jacobians);
+    for (int k = 0; k < NumTimeBlocks(pair); ++k) {
+      if (jacobians[times_block + k] == nullptr) continue;
+      jacobians[times_block + k][i] =
+          robust.derivative * (k == 0 ? ByTime(a, r.by_a, r.by_J_a) : ByTime(b, r.by_b, r.by_J_b));
+    }
     if (jacobians[kTauBlock] != nullptr) {
       Eigen::Map<Eigen::Vector3d>(jacobians[kTauBlock] + 3 * i) = robust.derivative * r.by_tau;
     }

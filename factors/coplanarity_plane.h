@@ -51,6 +51,8 @@ using BendVector = Eigen::Matrix<double, 6, 1>;
 //             bend         6   turn: change of tau from the top to the bottom row [rad], and bow
 //                              [rad]; give them a prior
 //             effects      of PairMeasurement::effects, if there are any
+//             times        1 and 1, with PairMeasurement::own_times: offsets of the two frames from
+//                          their stamps [s]; give them a prior
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    one per match, in sigmas. sigma_i is propagated through lens, readout and rotation,
 //             and differentiated with them.
@@ -66,7 +68,7 @@ class CoplanarityPlane final : public ceres::CostFunction {
 
   static constexpr int kTauBlock = 3;
   static constexpr int kBendBlock = 4;
-  static constexpr int kEffectsBlock = 5;  // the first rate group without effects
+  static constexpr int kEffectsBlock = 5;  // times, or the first rate group, without effects
 
   // s_i and c_i of a match: by how much turn and bow move its direction.
   static Eigen::Vector2d BendShares(const PairMeasurement& pair, const Match& match) {

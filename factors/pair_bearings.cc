@@ -8,21 +8,24 @@ namespace camgyro {
 
 BearingsOfMatch::BearingsOfMatch(const PairMeasurement& pair, const RotationChain& chain,
                                  const double* lens, const double* shutter,
-                                 const double* q_gyro_cam, const double* effects)
+                                 const double* q_gyro_cam, const double* effects,
+                                 const double* const* own_times)
     : pair_(pair),
       chain_(chain),
       lens_(Eigen::Map<const LensParameters>(lens)),
       shutter_(Eigen::Map<const ShutterParameters>(shutter)),
       R_gyro_cam_(Eigen::Map<const Eigen::Quaterniond>(q_gyro_cam).normalized().toRotationMatrix()),
-      effects_{pair.effects.get(), effects} {}
+      effects_{pair.effects.get(), effects},
+      frame_a_(own_times ? pair.frame_a.Moved(*own_times[0]) : pair.frame_a),
+      frame_b_(own_times ? pair.frame_b.Moved(*own_times[1]) : pair.frame_b) {}
 
 bool BearingsOfMatch::Evaluate(size_t match, bool derivatives, Bearing* a, Bearing* b) const {
   const Match& m = pair_.matches[match];
   const LensDerivatives by_lens = derivatives ? pair_.by_lens : LensDerivatives::kNone;
-  if (!EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, pair_.frame_a,
-                       pair_.size_px, m.px_a, effects_, a, by_lens) ||
-      !EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, pair_.frame_b,
-                       pair_.size_px, m.px_b, effects_, b, by_lens)) {
+  if (!EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, frame_a_, pair_.size_px,
+                       m.px_a, effects_, a, by_lens) ||
+      !EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, frame_b_, pair_.size_px,
+                       m.px_b, effects_, b, by_lens)) {
     return false;
   }
   b->ScaleNoise(m.noise_factor_b);
@@ -31,8 +34,9 @@ bool BearingsOfMatch::Evaluate(size_t match, bool derivatives, Bearing* a, Beari
 
 bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
                           const double* lens, const double* shutter, const double* q_gyro_cam,
-                          const double* effects, bool derivatives, PairBearings* bearings) {
-  const BearingsOfMatch of_match(pair, chain, lens, shutter, q_gyro_cam, effects);
+                          const double* effects, bool derivatives, PairBearings* bearings,
+                          const double* const* own_times) {
+  const BearingsOfMatch of_match(pair, chain, lens, shutter, q_gyro_cam, effects, own_times);
   const size_t n = pair.matches.size();
   bearings->a.resize(n);
   bearings->b.resize(n);
@@ -84,9 +88,10 @@ void PairRow::Write(int row, double scale, const double* q_gyro_cam, const PairM
     Eigen::Map<Eigen::RowVector4d>(jacobians[2] + row * 4) =
         scale * RotationManifold::Lift(gradient_.by_rotation, q_gyro_cam);
   }
-  if (pair.effects && jacobians[first_rate_group - 1] != nullptr) {
+  const int effects_block = first_rate_group - NumTimeBlocks(pair) - 1;
+  if (pair.effects && jacobians[effects_block] != nullptr) {
     const int size = pair.effects->size();
-    Eigen::Map<Eigen::RowVectorXd>(jacobians[first_rate_group - 1] + row * size, size) =
+    Eigen::Map<Eigen::RowVectorXd>(jacobians[effects_block] + row * size, size) =
         scale * gradient_.by_effects;
   }
   int column = 0;

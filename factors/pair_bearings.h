@@ -25,6 +25,8 @@ struct PairMeasurement {
   // Jacobians by the other lens parameters are zero, for solves that hold them; with effects: all.
   LensDerivatives by_lens = LensDerivatives::kAll;
   std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
+  // Each frame has a time of its own, a parameter: an offset from its stamp (CoplanarityPlane).
+  bool own_times = false;
 
   // Rates that the pair needs: their times, strictly increasing, split into consecutive groups of
   // these sizes (in samples), each with a parameter block. A parameter is the rate of a sample, or
@@ -46,20 +48,24 @@ struct PairMeasurement {
 // Order of the parameter blocks of the coplanarity factors:
 //   lens kLensSize, shutter kShutterSize, q_gyro_cam 4 (RotationManifold),
 //   [tau 3 (SphereManifold<3>), bend 6,] [effects, if the pair has any,]
+//   [offsets of frame a and b from their stamps, 1 each, if they have times of their own,]
 //   rate groups, 3 * num_rate_values each
 // q_gyro_cam is stored [x y z w].
 inline int NumEffectBlocks(const PairMeasurement& pair) { return pair.effects ? 1 : 0; }
+inline int NumTimeBlocks(const PairMeasurement& pair) { return pair.own_times ? 2 : 0; }
 
 struct PairBearings {
   std::vector<Bearing> a, b;
 };
 
 // The bearings of a pair's matches, one match at a time: those of a whole pair are a quarter of a
-// megabyte, which takes longer to allocate than to fill. Refers to its arguments.
+// megabyte, which takes longer to allocate than to fill. Refers to its arguments. own_times: the
+// two offsets from the stamps; null: none.
 class BearingsOfMatch {
  public:
   BearingsOfMatch(const PairMeasurement& pair, const RotationChain& chain, const double* lens,
-                  const double* shutter, const double* q_gyro_cam, const double* effects);
+                  const double* shutter, const double* q_gyro_cam, const double* effects,
+                  const double* const* own_times = nullptr);
   // False where the lens has no ray. PairRow needs `derivatives`.
   [[nodiscard]] bool Evaluate(size_t match, bool derivatives, Bearing* a, Bearing* b) const;
 
@@ -70,6 +76,7 @@ class BearingsOfMatch {
   const ShutterParameters shutter_;
   const Eigen::Matrix3d R_gyro_cam_;
   const PairEffects effects_;
+  const FrameTime frame_a_, frame_b_;
 };
 
 // Evaluates both bearings of every match; false where the lens has no ray. PairRow needs
@@ -77,7 +84,8 @@ class BearingsOfMatch {
 [[nodiscard]] bool EvaluatePairBearings(const PairMeasurement& pair, const RotationChain& chain,
                                         const double* lens, const double* shutter,
                                         const double* q_gyro_cam, const double* effects,
-                                        bool derivatives, PairBearings* bearings);
+                                        bool derivatives, PairBearings* bearings,
+                                        const double* const* own_times = nullptr);
 
 // The rates of a pair's samples as columns.
 Eigen::Matrix3Xd GatherRates(const PairMeasurement& pair, const double* const* groups);
@@ -102,7 +110,7 @@ class PairRow {
   const Eigen::Matrix3Xd& by_rates() const { return by_rates_; }
   // Writes the row, times `scale`, to the Jacobians of lens, shutter, rotation, effects and rate
   // groups. Entries of `jacobians` may be null (constant blocks). first_rate_group: index of that
-  // block; the effects, if the pair has any, come before it.
+  // block; the effects, if the pair has any, come before it and before the frames' own times.
   void Write(int row, double scale, const double* q_gyro_cam, const PairMeasurement& pair,
              int first_rate_group, double** jacobians) const;
 

@@ -20,18 +20,25 @@ RelativeRotation::RelativeRotation(std::shared_ptr<const Measurement> measuremen
   set_num_residuals(3);
   *mutable_parameter_block_sizes() = {kShutterSize, 4};
   if (m.effects) mutable_parameter_block_sizes()->push_back(m.effects->size());
+  if (m.own_times) mutable_parameter_block_sizes()->resize(parameter_block_sizes().size() + 2, 1);
   for (const int size : m.rate_group_sizes) mutable_parameter_block_sizes()->push_back(3 * size);
 }
 
 bool RelativeRotation::Evaluate(double const* const* parameters, double* residuals,
                                 double** jacobians) const {
   const Measurement& m = *measurement_;
-  const int first_rate_group = kEffectsBlock + (m.effects ? 1 : 0);
+  const int times_block = kEffectsBlock + (m.effects ? 1 : 0);
+  const int first_rate_group = times_block + (m.own_times ? 2 : 0);
   const RotationChain chain(m.rate_times_s,
                             GatherRates(m.rate_group_sizes, parameters + first_rate_group));
-  double time_a_s = m.frame_a.stamp_s, time_b_s = m.frame_b.stamp_s;
+  double time_a_s = m.frame_a.stamp_s + m.frame_a.offset_s;
+  double time_b_s = m.frame_b.stamp_s + m.frame_b.offset_s;
   for (double* time : {&time_a_s, &time_b_s}) {
     *time += parameters[0][kDelay] + m.row_fraction * parameters[0][kReadout];
+  }
+  if (m.own_times) {
+    time_a_s += *parameters[times_block];
+    time_b_s += *parameters[times_block + 1];
   }
   EffectSet::Change change_a, change_b;
   if (m.effects) {
@@ -74,6 +81,12 @@ bool RelativeRotation::Evaluate(double const* const* parameters, double* residua
                                                                           3, m.effects->size()) =
         J_phi_a *
         (a.PhiPerSecond() * change_a.time.row(0) - b.PhiPerSecond() * change_b.time.row(0));
+  }
+  for (int k = 0; m.own_times && k < 2; ++k) {
+    double* jacobian = jacobians[times_block + k];
+    if (jacobian == nullptr) continue;
+    Eigen::Map<Eigen::Vector3d>(jacobian, 3) =
+        J_phi_a * (k == 0 ? a.PhiPerSecond() : Eigen::Vector3d(-b.PhiPerSecond()));
   }
   if (jacobians[1] != nullptr) {
     const Eigen::Matrix3d J_rotation = robust * RightJacobianInverse(log_error) * R_gyro_cam *

@@ -18,6 +18,8 @@ namespace camgyro {
 // Parameters  shutter      2   t_r [s], t_d [s]
 //             q_gyro_cam   4   RotationManifold
 //             effects      of Measurement::effects, if there are any
+//             times        1 and 1, with Measurement::own_times: offsets of the two frames from
+//                          their stamps [s]; give them a prior
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    3, in sigmas, in the gyro frame of the second exposure
 // Valid       while the argument of Log turns by less than pi - 0.1 rad; the caller gates
@@ -32,6 +34,7 @@ class RelativeRotation final : public ceres::CostFunction {
     double sigma_rad = 0.0;                    // > 0, per axis
     double robust_threshold = 0.0;             // in sigmas of each axis; 0: no loss
     std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
+    bool own_times = false;                    // each frame has a time of its own
     std::vector<double> rate_times_s;
     std::vector<int> rate_group_sizes;
   };
@@ -41,7 +44,7 @@ class RelativeRotation final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
-  static constexpr int kEffectsBlock = 2;  // the first rate group without effects
+  static constexpr int kEffectsBlock = 2;  // times, or the first rate group, without effects
 
  private:
   const std::shared_ptr<const Measurement> measurement_;

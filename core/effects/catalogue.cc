@@ -15,6 +15,7 @@ const std::vector<EffectEntry>& EffectCatalogue() {
                                                      ClockSkewEntry(),
                                                      DelayStepEntry(),
                                                      DelayWanderEntry(),
+                                                     FrameStampJitterEntry(),
                                                      ReadoutDirectionEntry(),
                                                      ReadoutNonlinearEntry(),
                                                      GyroScaleEntry(),
@@ -110,6 +111,13 @@ double EffectSet::widened_sigma(PairLatent latent) const {
   double sigma = 0.0;
   for (const Item& item : items_) sigma = std::max(sigma, item.effect->widened_sigma(latent));
   return sigma;
+}
+
+int EffectSet::frame_time_spread() const {
+  for (const Item& item : items_) {
+    if (item.effect->frees_frame_times()) return item.first;
+  }
+  return -1;
 }
 
 Result<EffectSet> MakeEffects(const std::string& list, const EffectSetup& setup) {

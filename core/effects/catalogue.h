@@ -52,6 +52,8 @@ class EffectSet {
   LensParameters ConstantLens(const LensParameters& lens, const Eigen::VectorXd& values) const;
   // The widest prior of a latent that an effect asks for; 0: none does.
   double widened_sigma(PairLatent latent) const;
+  // Column of the spread of the frames' own times; -1: they have none.
+  int frame_time_spread() const;
 
  private:
   std::vector<Item> items_;
@@ -63,6 +65,11 @@ class EffectSet {
 struct PairEffects {
   const EffectSet* set = nullptr;
   const double* values = nullptr;  // set->size() of them
+  // Standard deviation of the frames' own times around their stamps [s]; 0: they have none.
+  double frame_time_spread_s() const {
+    const int column = set != nullptr ? set->frame_time_spread() : -1;
+    return column < 0 ? 0.0 : values[column];
+  }
 };
 
 // What the user asks for: "name" or "name:shape", separated by commas; without a shape, the usual

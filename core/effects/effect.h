@@ -29,10 +29,16 @@ struct EffectParameter {
 
 // A frame, as effects of the clock may depend on it. Seconds after the first gyro stamp.
 struct FrameTime {
-  double stamp_s;     // recorded, camera clock
-  double exposure_s;  // NaN: not recorded
+  double stamp_s;         // recorded, camera clock
+  double exposure_s;      // NaN: not recorded
+  double offset_s = 0.0;  // of the frame's own time from its stamp, where that is estimated
   FrameTime(double stamp = 0.0, double exposure = std::numeric_limits<double>::quiet_NaN())
       : stamp_s(stamp), exposure_s(exposure) {}
+  FrameTime Moved(double by_s) const {
+    FrameTime moved = *this;
+    moved.offset_s += by_s;
+    return moved;
+  }
 };
 
 // One observed pixel.
@@ -90,6 +96,9 @@ class Effect {
   virtual void SetStart(double* /*values*/) const {}
   // Stamp of the first frame on which it acts [s], for effects that EffectEntry::step_at makes.
   virtual std::optional<double> first_stamp_s() const { return std::nullopt; }
+  // Every frame has a time of its own, and the only parameter is their spread [s]: no residual
+  // depends on it, and it is estimated from the times themselves (estimator/window/frame_times.h).
+  virtual bool frees_frame_times() const { return false; }
 
  private:
   const std::vector<EffectParameter> parameters_;

@@ -14,6 +14,7 @@ EffectEntry OpticalStabilisationEntry();
 EffectEntry ClockSkewEntry();
 EffectEntry DelayStepEntry();
 EffectEntry DelayWanderEntry();
+EffectEntry FrameStampJitterEntry();
 EffectEntry ReadoutDirectionEntry();
 EffectEntry ReadoutNonlinearEntry();
 EffectEntry GyroScaleEntry();

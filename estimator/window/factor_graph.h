@@ -16,7 +16,17 @@
 namespace camgyro {
 
 // What a block is. The solver eliminates from the last kind and index to the first.
-enum class BlockKind { kLens, kShutter, kRotation, kEffects, kBias, kRates, kDirection, kBend };
+enum class BlockKind {
+  kLens,
+  kShutter,
+  kRotation,
+  kEffects,
+  kBias,
+  kRates,
+  kFrameTime,
+  kDirection,
+  kBend
+};
 
 struct BlockId {
   BlockKind kind = BlockKind::kLens;

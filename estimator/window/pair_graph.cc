@@ -75,14 +75,25 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
     num_effects_ = effects->size();
     CHECK_EQ(start.effect_values.size(), num_effects_);
     graph_.AddBlock(kEffectsBlock, {Geometry::kEuclidean, start.effect_values, {}});
-    Eigen::VectorXd inv_spread(num_effects_);
-    for (int i = 0; i < num_effects_; ++i) inv_spread[i] = 1.0 / effects->parameter(i).spread;
-    graph_.AddFactor(
-        std::make_shared<MarginalPrior>(
-            std::vector<MarginalPrior::Block>{{Eigen::VectorXd::Zero(num_effects_), false}},
-            inv_spread.asDiagonal(), Eigen::VectorXd::Zero(num_effects_)),
-        {kEffectsBlock});
+    if (const int column = effects->frame_time_spread();
+        column >= 0 && options.residual == ResidualKind::kPlane) {
+      double& spread_s = graph_.value(kEffectsBlock)[column];
+      if (spread_s <= 0.0) spread_s = effects->parameter(column).spread;
+      frame_time_spread_s_ = std::make_shared<double>(spread_s);
+    }
+    AddEffectsPrior();
   }
+}
+
+void PairGraph::AddEffectsPrior() {
+  Eigen::VectorXd inv_spread(num_effects_), mean = Eigen::VectorXd::Zero(num_effects_);
+  for (int i = 0; i < num_effects_; ++i) inv_spread[i] = 1.0 / Effects()->parameter(i).spread;
+  // What no residual depends on stays where it is.
+  if (has_frame_times()) mean[Effects()->frame_time_spread()] = *frame_time_spread_s_;
+  effects_prior_ = graph_.AddFactor(
+      std::make_shared<MarginalPrior>(std::vector<MarginalPrior::Block>{{mean, false}},
+                                      inv_spread.asDiagonal(), Eigen::VectorXd::Zero(num_effects_)),
+      {kEffectsBlock});
 }
 
 PairEffects PairGraph::EffectsNow() const {
@@ -267,8 +278,8 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
   if (static_cast<int>(m.matches.size()) < kMinMatches) return AddPairResult::kTooFewMatches;
   const auto [first, last] = Exposures(frame_a, frame_b);
   const AddPairResult covered =
-      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, RateStep(),
-                     &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
+      CoverWithRates(first - RateMargin(), last + RateMargin(), RateStep(), &pair.groups,
+                     &m.rate_times_s, &m.rate_group_sizes);
   if (covered != AddPairResult::kAdded) return covered;
   m.rate_step = RateStep();
   if (m.rate_step > 1) {
@@ -303,12 +314,15 @@ AddPairResult PairGraph::AddPair(int64_t id, const FrameTime& frame_a, const Fra
     m.readout_over_gap = readout_s / gap_s;
     pair.bend_sigma_rad = BendSigma(turn_sigma_rad_s_, readout_s, gap_s);
     const BendVector inv_sigma = pair.bend_sigma_rad.cwiseInverse();
-    graph_.AddFactor(std::make_shared<MarginalPrior>(
-                         std::vector<MarginalPrior::Block>{{BendVector::Zero(), false}},
-                         inv_sigma.asDiagonal(), BendVector::Zero()),
-                     {BendBlock(id)});
+    pair.bend_prior =
+        graph_.AddFactor(std::make_shared<MarginalPrior>(
+                             std::vector<MarginalPrior::Block>{{BendVector::Zero(), false}},
+                             inv_sigma.asDiagonal(), BendVector::Zero()),
+                         {BendBlock(id)});
   }
   if (num_effects_ > 0) blocks.push_back(kEffectsBlock);
+  m.own_times = has_frame_times();
+  AddFrameTimes(frame_a, frame_b, &pair, &blocks);
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
   if (options_.residual == ResidualKind::kPlane) {
     pair.factor = graph_.AddFactor(std::make_shared<CoplanarityPlane>(pair.measurement), blocks);
@@ -354,8 +368,8 @@ AddPairResult PairGraph::AddRotation(int64_t id, const FrameTime& frame_a, const
   RelativeRotation::Measurement& m = *pair.rotation;
   const auto [first, last] = Exposures(frame_a, frame_b);
   const AddPairResult covered =
-      CoverWithRates(first - options_.rate_margin_s, last + options_.rate_margin_s, /*step=*/1,
-                     &pair.groups, &m.rate_times_s, &m.rate_group_sizes);
+      CoverWithRates(first - RateMargin(), last + RateMargin(), /*step=*/1, &pair.groups,
+                     &m.rate_times_s, &m.rate_group_sizes);
   if (covered != AddPairResult::kAdded) return covered;
   m.q_a_b = q_a_b;
   m.frame_a = frame_a;
@@ -365,6 +379,8 @@ AddPairResult PairGraph::AddRotation(int64_t id, const FrameTime& frame_a, const
   m.robust_threshold = options_.robust_threshold;
   std::vector<BlockId> blocks = {kShutterBlock, kRotationBlock};
   if (num_effects_ > 0) blocks.push_back(kEffectsBlock);
+  m.own_times = has_frame_times();
+  AddFrameTimes(frame_a, frame_b, &pair, &blocks);
   for (const int64_t group : pair.groups) blocks.push_back(RatesBlock(group));
   pair.factor = graph_.AddFactor(std::make_shared<RelativeRotation>(pair.rotation), blocks);
   pairs_.emplace(id, std::move(pair));
@@ -376,9 +392,10 @@ SolveReport PairGraph::Solve(const SolveOptions& options) { return graph_.Solve(
 void PairGraph::MarginalizeOldest() {
   CHECK(!pairs_.empty());
   const auto oldest = pairs_.begin();
-  std::set<int64_t> still_needed;
+  std::set<int64_t> still_needed, frames_needed;
   for (auto it = std::next(oldest); it != pairs_.end(); ++it) {
     still_needed.insert(it->second.groups.begin(), it->second.groups.end());
+    frames_needed.insert(it->second.frame_times.begin(), it->second.frame_times.end());
   }
   // The last group stays: the next pair will start inside it.
   if (!groups_.empty()) still_needed.insert(groups_.rbegin()->first);
@@ -390,6 +407,11 @@ void PairGraph::MarginalizeOldest() {
   for (auto it = groups_.begin(); it != groups_.end() && still_needed.count(it->first) == 0;) {
     leaving.push_back(RatesBlock(it->first));
     it = groups_.erase(it);
+  }
+  for (const int64_t frame : oldest->second.frame_times) {
+    if (frames_needed.count(frame) > 0) continue;
+    leaving.push_back(FrameTimeBlock(frame));
+    frame_time_priors_.erase(frame);
   }
   const int64_t first_bias = groups_.empty() ? 0 : groups_.begin()->second.bias_index;
   for (const auto& [id, block] : graph_.blocks()) {

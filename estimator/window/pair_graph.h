@@ -5,6 +5,7 @@
 #define CAMGYRO_ESTIMATOR_WINDOW_PAIR_GRAPH_H_
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -15,6 +16,7 @@
 #include "core/calibration.h"
 #include "core/recording.h"
 #include "estimator/window/factor_graph.h"
+#include "estimator/window/frame_times.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/pair_bearings.h"
 #include "factors/relative_rotation.h"
@@ -144,6 +146,17 @@ class PairGraph {
   void SetSigma(int64_t id, double sigma);
   PairGraphOptions* options() { return &options_; }
 
+  // Whether frames have times of their own here (frame_stamp_jitter; planes and rotations only).
+  bool has_frame_times() const { return frame_time_spread_s_ != nullptr; }
+  // What each pair says of them at the present estimate of everything else; frames are named by
+  // FrameNumber.
+  std::vector<PairTimes> FrameTimes() const;
+  static int64_t FrameNumber(double stamp_s);  // [ns]
+  // Their spread, for the solves to come and for Estimate: of an effect's parameter, which no
+  // residual depends on.
+  void SetFrameTimeSpread(const Spread& spread);
+  double frame_time_spread_s() const { return *frame_time_spread_s_; }
+
   // The estimate. With covariance: of the present graph, inflated by the clustered (sandwich)
   // covariance where that is larger; `cluster_s` is the length of a cluster, and there must be at
   // least 8 of them. The bias is the mean over its blocks.
@@ -168,7 +181,9 @@ class PairGraph {
     std::vector<int64_t> groups;
     FactorGraph::FactorKey factor = 0;
     double time_s = 0.0;
-    BendVector bend_sigma_rad;  // prior
+    BendVector bend_sigma_rad;              // prior
+    FactorGraph::FactorKey bend_prior = 0;  // of pairs that have a bend
+    std::vector<int64_t> frame_times;       // blocks of its two frames' times, if they have any
   };
 
   // Null without effects that have parameters.
@@ -186,6 +201,14 @@ class PairGraph {
   // Samples per value of the rates of pairs with pixels.
   int RateStep() const;
   void AddBias(int64_t index);
+  // The frames' own times, if they have any: fills Pair::frame_times and appends to `blocks`.
+  void AddFrameTimes(const FrameTime& frame_a, const FrameTime& frame_b, Pair* pair,
+                     std::vector<BlockId>* blocks);
+  void AddEffectsPrior();
+  std::array<const double*, 2> OwnTimesOf(const Pair& pair) const;
+  PairTimes FrameTimesOf(const Pair& pair) const;
+  // Beyond the exposures of a pair [s].
+  double RateMargin() const;
   const TimedRate& sample(int64_t number) const {
     return samples_[static_cast<size_t>(number - first_sample_)];
   }
@@ -201,8 +224,13 @@ class PairGraph {
   std::deque<TimedRate> samples_;
   int64_t first_sample_ = 0;  // absolute number of samples_.front()
   double median_interval_s_ = 0.0;
-  int num_effects_ = 0;                  // parameters of all effects
-  std::map<int64_t, RateGroup> groups_;  // by id, in time order
+  int num_effects_ = 0;  // parameters of all effects
+  FactorGraph::FactorKey effects_prior_ = 0;
+  // Null: frames have no times of their own. Shared with their priors.
+  std::shared_ptr<double> frame_time_spread_s_;
+  double frame_time_spread_sigma_s_ = 0.0;
+  std::map<int64_t, FactorGraph::FactorKey> frame_time_priors_;  // by frame
+  std::map<int64_t, RateGroup> groups_;                          // by id, in time order
   int64_t next_group_ = 0;
   std::map<int64_t, Pair> pairs_;
   PairBearings bearings_;  // of Residuals, which are called often: kept allocated

@@ -23,6 +23,9 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
     std::vector<const double*> p = {graph_.value(kShutterBlock).data(),
                                     graph_.value(kRotationBlock).data()};
     if (num_effects_ > 0) p.push_back(EffectsNow().values);
+    for (const int64_t frame : pair.frame_times) {
+      p.push_back(graph_.value(FrameTimeBlock(frame)).data());
+    }
     for (const int64_t group : pair.groups) p.push_back(graph_.value(RatesBlock(group)).data());
     CHECK(graph_.factors().at(pair.factor).cost->Evaluate(p.data(), residuals.data(), nullptr));
     return residuals;
@@ -40,7 +43,8 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const RotationChain chain(m.rate_times_s, GatherRates(m, groups.data()));
   if (!EvaluatePairBearings(m, chain, graph_.value(kLensBlock).data(),
                             graph_.value(kShutterBlock).data(), graph_.value(kRotationBlock).data(),
-                            EffectsNow().values, false, &bearings_)) {
+                            EffectsNow().values, false, &bearings_,
+                            m.own_times ? OwnTimesOf(pair).data() : nullptr)) {
     return residuals;
   }
   if (options_.residual != ResidualKind::kPlane) {
@@ -151,6 +155,8 @@ bool PairGraph::EstimateCovariance(double cluster_s, double inflation,
     it->second += report.influence.at(key);
   };
   for (const auto& entry : pairs_) add(entry.second.factor, entry.second.time_s);
+  for (const auto& [frame, prior] : frame_time_priors_)
+    add(prior, 1e-9 * static_cast<double>(frame));
   for (const auto& entry : groups_) {
     add(entry.second.factor, sample(entry.second.first_sample).time_s - calibration->delay_s);
   }
@@ -166,6 +172,11 @@ bool PairGraph::EstimateCovariance(double cluster_s, double inflation,
   }
   calibration->covariance = covariance.topLeftCorner<kStateSize, kStateSize>();
   calibration->effect_covariance = covariance.bottomRightCorner(num_effects_, num_effects_);
+  if (has_frame_times()) {
+    const int column = Effects()->frame_time_spread();
+    calibration->effect_covariance(column, column) =
+        frame_time_spread_sigma_s_ * frame_time_spread_sigma_s_;
+  }
   return true;
 }
 

@@ -14,10 +14,11 @@ namespace camgyro {
 
 bool RatesOfPair(const EstimationInput& input, const TimedPair& pair,
                  const Calibration& calibration, std::vector<double>* times_s,
-                 Eigen::Matrix3Xd* rates) {
+                 Eigen::Matrix3Xd* rates, const Eigen::Vector2d& offsets_s) {
   const auto [from, to] = ExposureSpan({calibration.delay_s, calibration.readout_s},
                                        Eigen::Vector2d(calibration.width_px, calibration.height_px),
-                                       calibration.pair_effects(), pair.first(), pair.second());
+                                       calibration.pair_effects(), pair.first().Moved(offsets_s[0]),
+                                       pair.second().Moved(offsets_s[1]));
   const auto by_time = [](const TimedRate& rate, double t) { return rate.time_s < t; };
   auto first = std::lower_bound(input.rates.begin(), input.rates.end(), from, by_time);
   auto last = std::lower_bound(input.rates.begin(), input.rates.end(), to, by_time);
@@ -82,6 +83,7 @@ namespace {
 // Normal equations of some matches, about a plane: two coordinates of the direction, then the bend.
 struct PlaneEquations {
   using Matrix8d = Eigen::Matrix<double, 8, 8>;
+  using Vector8d = Eigen::Matrix<double, 8, 1>;
 
   PlaneEquations(const PairView& view, const PairPlane& plane, size_t first, size_t step) {
     const PairMeasurement& m = view.measurement;
@@ -93,15 +95,21 @@ struct PlaneEquations {
     for (size_t i = first; i < m.matches.size(); i += step) {
       const PlaneResidual r = ResidualOf(view, plane, i);
       const RobustResidual robust = Robustify(r.value, m.robust_threshold);
-      const Eigen::Vector2d shares = CoplanarityPlane::BendShares(m, m.matches[i]);
-      Vector8d J;
-      J.head<2>() = robust.derivative * (basis.transpose() * r.by_tau);
-      J.segment<3>(2) = robust.derivative * shares[0] * r.by_tau;
-      J.tail<3>() = robust.derivative * shares[1] * r.by_tau;
+      const Vector8d J = RowOf(view, r, robust, i);
       data += J * J.transpose();
       g += J * robust.value;
       cost += robust.value * robust.value;
     }
+  }
+  Vector8d RowOf(const PairView& view, const PlaneResidual& r, const RobustResidual& robust,
+                 size_t i) const {
+    const PairMeasurement& m = view.measurement;
+    const Eigen::Vector2d shares = CoplanarityPlane::BendShares(m, m.matches[i]);
+    Vector8d J;
+    J.head<2>() = robust.derivative * (basis.transpose() * r.by_tau);
+    J.segment<3>(2) = robust.derivative * shares[0] * r.by_tau;
+    J.tail<3>() = robust.derivative * shares[1] * r.by_tau;
+    return J;
   }
   Matrix8d WithPrior() const {
     Matrix8d H = data;
@@ -110,12 +118,35 @@ struct PlaneEquations {
     return H;
   }
 
-  using Vector8d = Eigen::Matrix<double, 8, 1>;
   Eigen::Matrix<double, 3, 2> basis;
   Matrix8d data = Matrix8d::Zero();
   Vector8d prior = Vector8d::Zero(), g = Vector8d::Zero();
   double cost = 0.0;
 };
+
+// One step of Gauss-Newton of the two frames' times, direction and bend free beside them.
+Eigen::Vector2d StepOfTimes(const PairView& view, const PairPlane& plane, double spread_s,
+                            size_t first, size_t step) {
+  const PairMeasurement& m = view.measurement;
+  const PlaneEquations equations(view, plane, first, step);
+  Eigen::Matrix2d H = Eigen::Matrix2d::Identity() / (spread_s * spread_s);
+  Eigen::Vector2d g = H * Eigen::Vector2d(m.frame_a.offset_s, m.frame_b.offset_s);
+  Eigen::Matrix<double, 8, 2> mixed = Eigen::Matrix<double, 8, 2>::Zero();
+  for (size_t i = first; i < m.matches.size(); i += step) {
+    const PlaneResidual r = ResidualOf(view, plane, i);
+    const RobustResidual robust = Robustify(r.value, m.robust_threshold);
+    const Eigen::Vector2d by_times =
+        robust.derivative * Eigen::Vector2d(ByTime(view.bearings.a[i], r.by_a, r.by_J_a),
+                                            ByTime(view.bearings.b[i], r.by_b, r.by_J_b));
+    mixed += equations.RowOf(view, r, robust, i) * by_times.transpose();
+    H += by_times * by_times.transpose();
+    g += robust.value * by_times;
+  }
+  const Eigen::LDLT<PlaneEquations::Matrix8d> rest(equations.WithPrior());
+  H -= mixed.transpose() * rest.solve(mixed);
+  g -= mixed.transpose() * rest.solve(equations.g);
+  return -H.ldlt().solve(g);
+}
 
 }  // namespace
 
@@ -151,12 +182,15 @@ double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t fir
 }
 
 bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
-              double noise_px, const PairGraphOptions& options, PairView* view) {
+              double noise_px, const PairGraphOptions& options, PairView* view,
+              const Eigen::Vector2d& offsets_s) {
   PairMeasurement& m = view->measurement;
-  if (!RatesOfPair(input, pair, calibration, &m.rate_times_s, &view->rates)) return false;
+  if (!RatesOfPair(input, pair, calibration, &m.rate_times_s, &view->rates, offsets_s)) {
+    return false;
+  }
   m.rate_group_sizes = {static_cast<int>(m.rate_times_s.size())};
-  m.frame_a = pair.first();
-  m.frame_b = pair.second();
+  m.frame_a = pair.first().Moved(offsets_s[0]);
+  m.frame_b = pair.second().Moved(offsets_s[1]);
   m.size_px << calibration.width_px, calibration.height_px;
   m.sigma_px = noise_px;
   m.noise = options.match_noise;
@@ -187,6 +221,31 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
       view->bearings.a.push_back(a);
       view->bearings.b.push_back(b);
     }
+  }
+  return true;
+}
+
+bool FitPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
+             double noise_px, const PairGraphOptions& options, PairView* view, PairPlane* plane,
+             size_t first, size_t step) {
+  constexpr int kMostSteps = 6;
+  constexpr double kConvergedS = 2e-6;  // turns by some 1e-6 rad
+  const double spread_s = calibration.pair_effects().frame_time_spread_s();
+  const auto fit_at = [&](const Eigen::Vector2d& offsets_s) {
+    if (!ViewPair(input, pair, calibration, noise_px, options, view, offsets_s) ||
+        static_cast<int>(view->measurement.matches.size()) < PairGraph::kMinMatches) {
+      return false;
+    }
+    *plane = FitPlane(*view, first, step);
+    return true;
+  };
+  Eigen::Vector2d offsets_s = Eigen::Vector2d::Zero();
+  if (!fit_at(offsets_s)) return false;
+  for (int i = 0; i < kMostSteps && spread_s > 0.0; ++i) {
+    const Eigen::Vector2d change = StepOfTimes(*view, *plane, spread_s, first, step);
+    if (!(change.norm() > kConvergedS)) break;
+    offsets_s += change;
+    if (!fit_at(offsets_s)) return false;
   }
   return true;
 }

@@ -32,14 +32,22 @@ struct PairPlane {
 };
 
 // False where the gyro's samples do not cover the pair. noise: pixels. Shutter, lens, effects and
-// bias are the calibration's.
+// bias are the calibration's. offsets_s: of the frames' times from their stamps.
 [[nodiscard]] bool ViewPair(const EstimationInput& input, const TimedPair& pair,
                             const Calibration& calibration, double noise_px,
-                            const PairGraphOptions& options, PairView* view);
+                            const PairGraphOptions& options, PairView* view,
+                            const Eigen::Vector2d& offsets_s = Eigen::Vector2d::Zero());
 
 // The plane that fits the matches first, first + step, ... of a view best: the direction searched,
 // its bend with the prior.
 PairPlane FitPlane(const PairView& view, size_t first = 0, size_t step = 1);
+// ViewPair and FitPlane; where frames have times of their own (frame_stamp_jitter), at those that
+// the same matches tell: measurement.frame_a and frame_b of the view have the offsets. False also
+// for fewer than PairGraph::kMinMatches.
+[[nodiscard]] bool FitPair(const EstimationInput& input, const TimedPair& pair,
+                           const Calibration& calibration, double noise_px,
+                           const PairGraphOptions& options, PairView* view, PairPlane* plane,
+                           size_t first = 0, size_t step = 1);
 // That a plane takes from these matches: 2 of a direction with a bend that its prior determines, at
 // most 6, since what of the bend lies along the direction changes nothing.
 double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t first = 0,
@@ -55,7 +63,8 @@ std::vector<double> TransferResiduals(const PairView& view, const Calibration& c
 // saturated, or two of them are further apart than 30 ms and than five mean intervals.
 [[nodiscard]] bool RatesOfPair(const EstimationInput& input, const TimedPair& pair,
                                const Calibration& calibration, std::vector<double>* times_s,
-                               Eigen::Matrix3Xd* rates);
+                               Eigen::Matrix3Xd* rates,
+                               const Eigen::Vector2d& offsets_s = Eigen::Vector2d::Zero());
 
 }  // namespace camgyro
 

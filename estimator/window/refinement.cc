@@ -113,6 +113,19 @@ class NoiseScale {
   double gyro_variance_ = 0.0;  // of a turn between attitudes, per axis [rad^2]; 0 with pixels
 };
 
+// The spread of the frames' own times, if they have any, for the next solve. True if it has
+// settled: within 3 %, as the scale of the noise, or so small that no match shows it.
+bool UpdateFrameTimes(PairGraph* graph, std::vector<FrameOffset>* offsets) {
+  if (!graph->has_frame_times()) return true;
+  constexpr double kNothingS = 1e-5;
+  const std::vector<PairTimes> times = graph->FrameTimes();
+  const Spread spread = MostLikelySpread(times);
+  const double before_s = graph->frame_time_spread_s();
+  *offsets = OffsetsOf(times, spread.value_s);
+  graph->SetFrameTimeSpread(spread);
+  return std::abs(spread.value_s - before_s) < std::max(kNothingS, 0.03 * before_s);
+}
+
 // A tenth of a sigma. Robust weights and strong correlations (f and k1) make steps fall short.
 constexpr double kCostTolerance = 0.005;
 
@@ -178,12 +191,13 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
     const SolveReport report = graph->Solve({30, 1e-5, kCostTolerance});
     if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
+    const bool spread_settled = UpdateFrameTimes(graph.get(), &result.frame_times);
     const auto residuals = all_residuals(/*search=*/false);
     const double next_scale = noise.Next(residuals, scale);
     result.calibration = graph->Estimate();
     const StateVector moved = Difference(result.calibration, before);
     const bool last = result.rounds == options.max_rounds;
-    if (std::abs(next_scale / scale - 1.0) > 0.03 && !last) {
+    if ((std::abs(next_scale / scale - 1.0) > 0.03 || !spread_settled) && !last) {
       set_scale(next_scale);
       continue;
     }
@@ -234,14 +248,16 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
   FitSum sum(options, CountsOf(options.residual).per_match);
   PairView view;
   for (const TimedPair& pair : pairs) {
-    if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
-    if (view.bearings.a.size() < PairGraph::kMinMatches) continue;
-    ++fit.pairs;
     if (options.residual == ResidualKind::kSymmetricTransfer) {
+      if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
+      if (view.bearings.a.size() < PairGraph::kMinMatches) continue;
+      ++fit.pairs;
       sum.Add(TransferResiduals(view, calibration));
       continue;
     }
-    const PairPlane plane = FitPlane(view, 0, 2);
+    PairPlane plane;
+    if (!FitPair(input, pair, calibration, noise_px, options, &view, &plane, 0, 2)) continue;
+    ++fit.pairs;
     std::vector<double> residuals;
     for (size_t i = 1; i < view.bearings.a.size(); i += 2) {
       residuals.push_back(ResidualOf(view, plane, i).value);

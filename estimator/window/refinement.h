@@ -34,6 +34,8 @@ struct Refined {
   int rounds = 0;
   bool converged = false;
   int skipped_pairs = 0;  // gyro gaps, too few matches, outside the gyro's time
+  // With frame_stamp_jitter: of every frame that is in a pair, by PairGraph::FrameNumber.
+  std::vector<FrameOffset> frame_times;
 };
 
 // Fits all `pairs` of the input. start: values with effects.
@@ -49,7 +51,8 @@ using Refit = std::function<Result<Refined>(const Calibration& start, double noi
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit);
 
 // Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
-// direction of each pair from every other match, residuals from the rest. A transfer has no
+// direction of each pair (and its frames' own times, if they have any) from every other match,
+// residuals from the rest. A transfer has no
 // direction: residuals from all matches.
 struct UnseenFit {
   int pairs = 0;

@@ -110,6 +110,22 @@ void SlidingWindow::UpdateNoise() {
   noise_px_ *= settled_ ? std::pow(relative, 0.1) : relative;
   graph_.options()->sigma_px = noise_px_;
   for (const int64_t id : ids) graph_.SetSigma(id, noise_px_);
+  if (graph_.has_frame_times()) UpdateFrameTimes();
+}
+
+void SlidingWindow::UpdateFrameTimes() {
+  const std::vector<PairTimes> times = graph_.FrameTimes();
+  const Spread here = MostLikelySpread(times);
+  const double before_s = graph_.frame_time_spread_s();
+  // A window in which the camera rests says nothing of it.
+  constexpr double kWithinNoise = 1.0;
+  if (TwoLogLikelihood(times, here.value_s) - TwoLogLikelihood(times, before_s) < kWithinNoise) {
+    graph_.SetFrameTimeSpread({before_s, here.sigma_s});
+    return;
+  }
+  const double change = std::clamp(std::log(here.value_s / before_s), -1.0, 1.0);
+  const double share = settled_ ? 0.1 : 1.0;  // as of the noise
+  graph_.SetFrameTimeSpread({before_s * std::exp(share * change), here.sigma_s});
 }
 
 bool SlidingWindow::Settled(const Calibration& estimate) const {

@@ -84,6 +84,7 @@ class SlidingWindow {
   void ProcessPending();
   void Process(const Pending& pair);
   void UpdateNoise();
+  void UpdateFrameTimes();
   bool Settled(const Calibration& estimate) const;
 
   const SlidingWindowOptions options_;

@@ -186,6 +186,40 @@ TEST(CoplanarityPlane, JacobianMatchesDifferencesWithTheLossOn) {
   }
 }
 
+// An offset of a frame's time is an error of its stamp, which makes up for the other one.
+TEST(CoplanarityPlane, TakesTheFramesOwnTimes) {
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    PairScene s = MakePairScene(seed);
+    s.pair->own_times = true;
+    s.pair->frame_a.stamp_s += 0.002;
+    s.pair->frame_b.stamp_s -= 0.003;
+    double off = 0.0;
+    for (const double r : Residuals(CoplanarityPlane(s.pair), s.Parameters())) {
+      off = std::max(off, std::abs(r));
+    }
+    EXPECT_GT(off, 0.1) << seed;
+    s.times_s << -0.002, 0.003;
+    for (const double r : Residuals(CoplanarityPlane(s.pair), s.Parameters())) {
+      EXPECT_LT(std::abs(r), 1e-8) << seed;
+    }
+  }
+}
+
+TEST(CoplanarityPlane, JacobianByTheFramesOwnTimesMatchesDifferences) {
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    SCOPED_TRACE(seed);
+    PairScene s = MakePairScene(seed);
+    Disturb(seed, &s);
+    s.pair->own_times = true;
+    s.times_s << 0.002, -0.001;
+    s.pair->robust_threshold = seed % 2 == 0 ? 0.0 : 1.7;
+    if (seed % 3 == 1) {
+      for (Match& match : s.pair->matches) match.noise_factor_b = {0.8, 0.1, 1.2};
+    }
+    ExpectJacobiansMatchDifferences(CoplanarityPlane(s.pair), s.Parameters(), 1e-6);
+  }
+}
+
 TEST(CoplanarityPlane, RejectsAStepToWhereALensHasNoRay) {
   PairScene s = MakePairScene(6);
   s.lens[kK1] = -3.0;

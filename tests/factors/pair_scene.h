@@ -21,6 +21,7 @@ struct PairScene {
   Eigen::Vector3d tau;  // unit, in the reference (gyro frame at the first rate)
   Eigen::Matrix<double, 6, 1> bend = Eigen::Matrix<double, 6, 1>::Zero();
   std::vector<Eigen::Matrix3Xd> rate_groups;
+  Eigen::Vector2d times_s = Eigen::Vector2d::Zero();  // of the frames from their stamps
 
   // Parameter pointers in the order of CoplanarityPlane, or without tau.
   std::vector<double*> Parameters(bool with_tau = true) {
@@ -28,6 +29,10 @@ struct PairScene {
     if (with_tau) {
       p.push_back(tau.data());
       p.push_back(bend.data());
+    }
+    if (pair->own_times) {
+      p.push_back(&times_s[0]);
+      p.push_back(&times_s[1]);
     }
     for (auto& group : rate_groups) p.push_back(group.data());
     return p;

@@ -21,9 +21,14 @@ struct Scene {
   ShutterParameters shutter;
   Quaterniond q_gyro_cam;
   std::vector<Eigen::Matrix3Xd> groups;
+  Eigen::Vector2d times_s = Eigen::Vector2d::Zero();  // of the frames from their stamps
 
   std::vector<double*> Parameters() {
     std::vector<double*> p = {shutter.data(), q_gyro_cam.coeffs().data()};
+    if (measurement.own_times) {
+      p.push_back(&times_s[0]);
+      p.push_back(&times_s[1]);
+    }
     for (auto& group : groups) p.push_back(group.data());
     return p;
   }
@@ -80,6 +85,23 @@ TEST(RelativeRotation, JacobianMatchesDifferences) {
     Scene s = MakeScene(seed);
     s.shutter[kDelay] += 0.0013;
     s.q_gyro_cam = s.q_gyro_cam * Exp(Vector3d(0.1, -0.2, 0.15));
+    const RelativeRotation factor(std::make_shared<RelativeRotation::Measurement>(s.measurement));
+    ExpectJacobiansMatchDifferences(factor, s.Parameters(), 1e-7);
+  }
+}
+
+// An offset of a frame's time is an error of its stamp, which makes up for the other one.
+TEST(RelativeRotation, TakesTheFramesOwnTimes) {
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    SCOPED_TRACE(seed);
+    Scene s = MakeScene(seed);
+    s.measurement.own_times = true;
+    s.measurement.frame_a.stamp_s += 0.002;
+    s.measurement.frame_b.stamp_s -= 0.003;
+    EXPECT_GT(s.Residual().norm(), 0.1);
+    s.times_s << -0.002, 0.003;
+    EXPECT_LT(s.Residual().norm(), 1e-9);
+    s.times_s << 0.001, -0.004;
     const RelativeRotation factor(std::make_shared<RelativeRotation::Measurement>(s.measurement));
     ExpectJacobiansMatchDifferences(factor, s.Parameters(), 1e-7);
   }

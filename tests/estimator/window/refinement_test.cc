@@ -52,6 +52,57 @@ TEST(Refinement, RecoversTheTruth) {
   }
 }
 
+// Stamps that scatter by 2 ms: with times of their own the frames are where they were, and the
+// calibration is right within its sigmas; without, neither. A recording without jitter shows none.
+TEST(Refinement, FramesHaveTimesOfTheirOwn) {
+  Scenario scenario = ShortScenario(8.0);
+  scenario.effects.frame_stamp_jitter.spread_s = 2e-3;
+  const Simulated s = SimulateTracks(scenario).value();
+  const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  const Prior prior = StartOffTheTruth(s.truth);
+  const Result<Refined> without = Refine(input, input.pairs, prior.mean, prior, {});
+  ASSERT_TRUE(without.has_value()) << without.error().message;
+  Calibration start = prior.mean;
+  start.effects = std::make_shared<const EffectSet>(
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+  start.effect_values = Eigen::VectorXd::Zero(1);
+  const Result<Refined> refined = Refine(input, input.pairs, start, prior, {});
+  ASSERT_TRUE(refined.has_value()) << refined.error().message;
+  const Calibration& c = refined->calibration;
+  EXPECT_LT(ErrorInSigmas(c, s.truth).cwiseAbs().maxCoeff(), 4.0);
+  EXPECT_LT(refined->quality.noise_px, 0.95 * without->quality.noise_px);
+  const double sigma_s = std::sqrt(c.effect_covariance(0, 0));
+  EXPECT_LT(std::abs(c.effect_values[0] - 2e-3), 4.0 * sigma_s);
+  EXPECT_LT(sigma_s, 0.3e-3);
+  // Each frame's delay is in the truth.
+  ASSERT_GT(refined->frame_times.size(), 200u);
+  double sum_sq = 0.0;
+  int told = 0;
+  for (const FrameOffset& frame : refined->frame_times) {
+    for (size_t i = 0; i < s.frames.size(); ++i) {
+      if (s.recording.frames[i].stamp_ns != input.origin_ns + frame.frame) continue;
+      sum_sq += std::pow((c.delay_s + frame.offset_s - s.frames[i].delay_s) / frame.sigma_s, 2);
+      if (frame.sigma_s < 1e-3) ++told;
+    }
+  }
+  EXPECT_GT(told, 100);
+  EXPECT_NEAR(sum_sq / static_cast<double>(refined->frame_times.size()), 1.0, 0.4);
+  // Frames that the fit has not seen tell their times by half of their matches.
+  const UnseenFit as_recorded =
+      EvaluateUnseen(input, input.pairs, without->calibration, refined->quality.noise_px, {});
+  const UnseenFit repaired = EvaluateUnseen(input, input.pairs, c, refined->quality.noise_px, {});
+  EXPECT_LT(repaired.rms_px, 0.97 * as_recorded.rms_px);
+
+  scenario.effects.frame_stamp_jitter.spread_s = 0.0;
+  const Simulated clean = SimulateTracks(scenario).value();
+  const EstimationInput clean_input =
+      MakeEstimationInput(clean.recording, SelectPairs(clean.recording));
+  const Result<Refined> none = Refine(clean_input, clean_input.pairs, start, prior, {});
+  ASSERT_TRUE(none.has_value()) << none.error().message;
+  EXPECT_LT(none->calibration.effect_values[0], 0.3e-3);
+  EXPECT_LT(ErrorInSigmas(none->calibration, clean.truth).cwiseAbs().maxCoeff(), 4.0);
+}
+
 // Motion blur: noise along the motion five times that across. Taken for alike in all directions,
 // the correction for errors in variables is wrong; the factor makes it right.
 TEST(Refinement, NoiseAlongTheMotionIsNoBiasIfItIsKnown) {

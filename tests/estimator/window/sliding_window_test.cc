@@ -272,5 +272,30 @@ TEST(SlidingWindow, WhatTheMotionDoesNotDetermineKeepsItsPrior) {
   EXPECT_LT(last[kStateDelay], 0.1 * prior[kStateDelay]);
 }
 
+// A latent time per frame goes with the last pair that needs it, and the spread is found on the
+// way.
+TEST(SlidingWindow, FramesHaveTimesOfTheirOwn) {
+  simulation::Scenario scenario = ShortScenario(8.0);
+  scenario.effects.frame_stamp_jitter.spread_s = 2e-3;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const Prior prior = StartOffTheTruth(s.truth);
+  Calibration start = prior.mean;
+  start.effects = std::make_shared<const EffectSet>(
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+  start.effect_values = Eigen::VectorXd::Zero(1);
+  SlidingWindow window(start, prior, s.recording.gyro.front().stamp_ns, {});
+  FeedAll(s.recording, &window);
+  EXPECT_EQ(window.num_failed_solves(), 0);
+  ASSERT_TRUE(window.latest().settled);
+  const Calibration& c = window.latest().estimate;
+  EXPECT_LT(ErrorInSigmas(c, s.truth).cwiseAbs().maxCoeff(), 4.5);
+  EXPECT_NEAR(c.effect_values[0], 2e-3, 0.8e-3);
+  int times = 0;
+  for (const auto& entry : window.graph().graph().blocks()) {
+    if (entry.first.kind == BlockKind::kFrameTime) ++times;
+  }
+  EXPECT_EQ(times, window.graph().num_pairs() + 1);  // neighbours share a frame
+}
+
 }  // namespace
 }  // namespace camgyro

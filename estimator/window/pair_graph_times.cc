@@ -1,0 +1,153 @@
+// The frames' own times in a PairGraph.
+#include <glog/logging.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "estimator/window/pair_blocks.h"
+#include "estimator/window/pair_graph.h"
+#include "factors/frame_time_prior.h"
+
+namespace camgyro {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Normal equations of some factors by some blocks, the others held.
+class LocalEquations {
+ public:
+  void AddBlock(const BlockId& id, const Block& block) {
+    if (columns_.emplace(id, size_).second) size_ += block.tangent_size();
+  }
+  void Begin() {
+    H_.setZero(size_, size_);
+    g_.setZero(size_);
+  }
+  void Add(const FactorGraph& graph, const Factor& factor) {
+    std::vector<const double*> values;
+    std::vector<RowMajor> jacobians;
+    std::vector<double*> pointers;
+    const int rows = factor.cost->num_residuals();
+    jacobians.reserve(factor.blocks.size());
+    for (const BlockId& id : factor.blocks) {
+      values.push_back(graph.value(id).data());
+      const bool wanted = columns_.count(id) > 0;
+      jacobians.emplace_back(wanted ? rows : 0, graph.value(id).size());
+      pointers.push_back(wanted ? jacobians.back().data() : nullptr);
+    }
+    Eigen::VectorXd r(rows);
+    if (!factor.cost->Evaluate(values.data(), r.data(), pointers.data())) return;
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, size_);
+    for (size_t i = 0; i < factor.blocks.size(); ++i) {
+      if (pointers[i] == nullptr) continue;
+      const Block& block = graph.block(factor.blocks[i]);
+      const int at = columns_.at(factor.blocks[i]);
+      if (block.geometry == Geometry::kDirection) {
+        Eigen::Matrix<double, 3, 2> basis;
+        const Eigen::Vector3d tau = block.value;
+        basis.col(0) = tau.unitOrthogonal();
+        basis.col(1) = tau.cross(basis.col(0));
+        J.middleCols<2>(at) = jacobians[i] * basis;
+      } else {
+        J.middleCols(at, block.tangent_size()) = jacobians[i];
+      }
+    }
+    H_.noalias() += J.transpose() * J;
+    g_.noalias() += J.transpose() * r;
+  }
+  int column(const BlockId& id) const { return columns_.at(id); }
+  const Eigen::MatrixXd& H() const { return H_; }
+  const Eigen::VectorXd& g() const { return g_; }
+
+ private:
+  std::map<BlockId, int> columns_;
+  int size_ = 0;
+  Eigen::MatrixXd H_;
+  Eigen::VectorXd g_;
+};
+
+}  // namespace
+
+int64_t PairGraph::FrameNumber(double stamp_s) { return std::llround(1e9 * stamp_s); }
+
+double PairGraph::RateMargin() const {
+  // A time of its own is rarely off by more.
+  constexpr double kSpreads = 4.0;
+  return options_.rate_margin_s + (has_frame_times() ? kSpreads * *frame_time_spread_s_ : 0.0);
+}
+
+void PairGraph::AddFrameTimes(const FrameTime& frame_a, const FrameTime& frame_b, Pair* pair,
+                              std::vector<BlockId>* blocks) {
+  if (!has_frame_times()) return;
+  for (const FrameTime& frame : {frame_a, frame_b}) {
+    const int64_t number = FrameNumber(frame.stamp_s);
+    if (!graph_.Has(FrameTimeBlock(number))) {
+      graph_.AddBlock(FrameTimeBlock(number), {Geometry::kEuclidean, Eigen::VectorXd::Zero(1), {}});
+      frame_time_priors_[number] = graph_.AddFactor(
+          std::make_shared<FrameTimePrior>(frame_time_spread_s_), {FrameTimeBlock(number)});
+    }
+    pair->frame_times.push_back(number);
+    blocks->push_back(FrameTimeBlock(number));
+  }
+}
+
+std::array<const double*, 2> PairGraph::OwnTimesOf(const Pair& pair) const {
+  return {graph_.value(FrameTimeBlock(pair.frame_times[0])).data(),
+          graph_.value(FrameTimeBlock(pair.frame_times[1])).data()};
+}
+
+PairTimes PairGraph::FrameTimesOf(const Pair& pair) const {
+  const Factor& factor = graph_.factors().at(pair.factor);
+  LocalEquations equations;
+  for (const int64_t frame : pair.frame_times) {
+    equations.AddBlock(FrameTimeBlock(frame), graph_.block(FrameTimeBlock(frame)));
+  }
+  for (const BlockId& id : factor.blocks) {
+    if (id.kind == BlockKind::kRates || id.kind == BlockKind::kDirection ||
+        id.kind == BlockKind::kBend) {
+      equations.AddBlock(id, graph_.block(id));
+    }
+  }
+  equations.Begin();
+  equations.Add(graph_, factor);
+  if (pair.measurement != nullptr) {
+    equations.Add(graph_, graph_.factors().at(pair.bend_prior));
+  }
+  for (const int64_t group : pair.groups) {
+    equations.Add(graph_, graph_.factors().at(groups_.at(group).factor));
+  }
+  const Eigen::Index rest = equations.g().size() - 2;
+  Eigen::MatrixXd H_rest = equations.H().bottomRightCorner(rest, rest);
+  H_rest.diagonal().array() += 1e-9;  // a direction that nothing determines
+  const Eigen::LDLT<Eigen::MatrixXd> solver(H_rest);
+  const Eigen::MatrixXd mixed = equations.H().bottomLeftCorner(rest, 2);
+  PairTimes times;
+  times.frame_a = pair.frame_times[0];
+  times.frame_b = pair.frame_times[1];
+  times.information = equations.H().topLeftCorner<2, 2>() - mixed.transpose() * solver.solve(mixed);
+  const auto [a, b] = OwnTimesOf(pair);
+  // The score at offsets of zero, from that where they are.
+  times.score = equations.g().head<2>() -
+                mixed.transpose() * solver.solve(equations.g().tail(rest)) -
+                times.information * Eigen::Vector2d(*a, *b);
+  return times;
+}
+
+std::vector<PairTimes> PairGraph::FrameTimes() const {
+  std::vector<PairTimes> all;
+  if (!has_frame_times()) return all;
+  for (const auto& entry : pairs_) all.push_back(FrameTimesOf(entry.second));
+  return all;
+}
+
+void PairGraph::SetFrameTimeSpread(const Spread& spread) {
+  CHECK(has_frame_times());
+  CHECK_GT(spread.value_s, 0.0);
+  *frame_time_spread_s_ = spread.value_s;
+  frame_time_spread_sigma_s_ = spread.sigma_s;
+  graph_.value(kEffectsBlock)[Effects()->frame_time_spread()] = spread.value_s;
+  graph_.RemoveFactor(effects_prior_);
+  AddEffectsPrior();
+}
+
+}  // namespace camgyro

@@ -1,0 +1,88 @@
+#include "estimator/window/frame_times.h"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+namespace camgyro {
+namespace {
+
+// Pairs of neighbours, each with random information about its frames' offsets, which were drawn
+// with a spread: measurements y = o + noise of that information.
+std::vector<PairTimes> DrawPairs(int frames, double spread_s, double sigma_s, uint64_t seed,
+                                 Eigen::VectorXd* offsets) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  offsets->resize(frames);
+  for (double& offset : *offsets) offset = spread_s * normal(random);
+  std::vector<PairTimes> pairs;
+  for (int i = 0; i + 1 < frames; ++i) {
+    // One direction is told well, the difference; the other one ten times worse.
+    Eigen::Matrix2d L;
+    L << 1.0, -1.0, 0.1, 0.1 + 0.05 * normal(random);
+    L /= sigma_s;
+    const Eigen::Vector2d measured =
+        L * offsets->segment<2>(i) + Eigen::Vector2d(normal(random), normal(random));
+    pairs.push_back({i, i + 1, -L.transpose() * measured, L.transpose() * L});
+  }
+  return pairs;
+}
+
+// The likelihood is that of the scores, which are Gaussian with covariance W + s^2 W W: compared
+// with the density of a dense Gaussian.
+TEST(FrameTimes, LikelihoodIsThatOfTheScores) {
+  Eigen::VectorXd offsets;
+  const std::vector<PairTimes> pairs = DrawPairs(7, 2e-3, 1e-3, 3, &offsets);
+  Eigen::MatrixXd W = Eigen::MatrixXd::Zero(7, 7);
+  Eigen::VectorXd score = Eigen::VectorXd::Zero(7);
+  for (const PairTimes& pair : pairs) {
+    W.block<2, 2>(pair.frame_a, pair.frame_a) += pair.information;
+    score.segment<2>(pair.frame_a) += pair.score;
+  }
+  const auto two_log_density = [&](double s) {
+    const Eigen::MatrixXd C = W + s * s * W * W;
+    return -score.dot(C.ldlt().solve(score)) - C.ldlt().vectorD().array().log().sum();
+  };
+  for (const double s : {1e-4, 1e-3, 5e-3}) {
+    EXPECT_NEAR(TwoLogLikelihood(pairs, s), two_log_density(s) - two_log_density(0.0), 1e-6) << s;
+  }
+  const Eigen::MatrixXd P = (W + Eigen::MatrixXd::Identity(7, 7) / 4e-6).inverse();
+  const std::vector<FrameOffset> found = OffsetsOf(pairs, 2e-3);
+  ASSERT_EQ(found.size(), 7u);
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_EQ(found[static_cast<size_t>(i)].frame, i);
+    EXPECT_NEAR(found[static_cast<size_t>(i)].offset_s, -P.row(i).dot(score), 1e-12);
+    EXPECT_NEAR(found[static_cast<size_t>(i)].sigma_s, std::sqrt(P(i, i)), 1e-12);
+  }
+}
+
+TEST(FrameTimes, SpreadIsFoundWithItsSigma) {
+  double sum_sq = 0.0;
+  constexpr int kSeeds = 40;
+  for (uint64_t seed = 0; seed < kSeeds; ++seed) {
+    Eigen::VectorXd offsets;
+    const Spread spread = MostLikelySpread(DrawPairs(60, 2e-3, 0.5e-3, seed, &offsets));
+    // 60 offsets alone leave 1 / sqrt(120) of a spread unknown.
+    EXPECT_GT(spread.sigma_s, 2e-3 / std::sqrt(120.0) * 0.7);
+    sum_sq += std::pow(std::log(spread.value_s / 2e-3) * spread.value_s / spread.sigma_s, 2);
+  }
+  // chi-square of 40: its standard deviation is 0.22 of it; four of them.
+  EXPECT_NEAR(sum_sq / kSeeds, 1.0, 0.9);
+}
+
+TEST(FrameTimes, ASpreadThatIsNotThereIsSmall) {
+  int nothing = 0;
+  for (uint64_t seed = 0; seed < 40; ++seed) {
+    Eigen::VectorXd offsets;
+    const Spread spread = MostLikelySpread(DrawPairs(60, 0.0, 0.5e-3, seed, &offsets));
+    EXPECT_LT(spread.value_s, 0.4e-3);
+    if (spread.value_s < 2e-6) ++nothing;
+  }
+  EXPECT_GT(nothing, 8);  // a half, but for what a short series is biased by
+  EXPECT_EQ(MostLikelySpread({}).value_s, kLeastSpreadS);
+}
+
+}  // namespace
+}  // namespace camgyro
