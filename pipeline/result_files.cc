@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "core/standard_distortion.h"
+#include "core/time.h"
 
 namespace camgyro {
 namespace {
@@ -229,6 +230,17 @@ std::string TraceCsv(const std::vector<WindowUpdate>& trace) {
     for (const double value : TraceValues(update.estimate)) out << "," << value;
     for (const double value : Segment(update.estimate.sigma(), 0, kStateSize)) out << "," << value;
     out << "\n";
+  }
+  return out.str();
+}
+
+std::string FrameTimesCsv(const Recording& recording, const std::vector<FrameOffset>& frame_times) {
+  std::ostringstream out;
+  out << "#stamp_ns,repaired_stamp_ns,sigma_ns\n";
+  for (const FrameOffset& frame : frame_times) {
+    const int64_t stamp_ns = recording.gyro.front().stamp_ns + frame.frame;
+    out << stamp_ns << "," << StampAt(stamp_ns, frame.offset_s) << ","
+        << std::llround(1e9 * frame.sigma_s) << "\n";
   }
   return out.str();
 }

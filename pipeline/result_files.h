@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/calibration.h"
+#include "core/recording.h"
 #include "core/result.h"
 #include "estimator/calibrate.h"
 
@@ -40,6 +41,10 @@ std::string CalibrationYaml(const CalibrationReport& report, bool attitudes);
 // One row per solved window, at the stamp of its last frame [camera clock]; only the header without
 // an online pass. The sigmas of the rotation are three angles about the camera's axes [rad].
 std::string TraceCsv(const std::vector<WindowUpdate>& trace);
+
+// The frames' own times [ns, camera clock]: recorded stamp, repaired stamp, and its sigma. A
+// repaired stamp + delay of row 0 is on the gyro's clock.
+std::string FrameTimesCsv(const Recording& recording, const std::vector<FrameOffset>& frame_times);
 
 // The delay search's curve: fraction of the gyro's power that is not explained at each delay.
 std::string DelayCsv(const std::vector<DelayResidual>& curve);

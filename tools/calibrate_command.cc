@@ -81,6 +81,10 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   const bool attitudes = recording->HasOnlyAttitudes();
   files.Add("trace.csv", TraceCsv(report->trace));
   files.Add("delay.csv", DelayCsv(report->start.curve));
+  const bool has_frame_times = !report->frame_times.empty();
+  if (has_frame_times) {
+    files.Add("frame_times.csv", FrameTimesCsv(*recording, report->frame_times));
+  }
   const std::string yaml = CalibrationYaml(*report, attitudes) + InputYaml(*recording);
   files.Add("calibration.yaml", yaml);
   const Command command = CalibrateCommand();
@@ -101,8 +105,8 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
                 QualityLine(*report, attitudes).c_str(),
                 TimeLine(*report, tracking->seconds, recording->frames.size()).c_str(),
                 Notes("note", report->notes).c_str(), Notes("doubt", report->doubts).c_str());
-    std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv\n",
-                files.folder().c_str());
+    std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv%s\n",
+                files.folder().c_str(), has_frame_times ? ", frame_times.csv" : "");
   }
   return CheckDetermined(report->calibration);
 }

@@ -67,6 +67,9 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
     files.Add("trace.csv", TraceCsv(diagnosis.before->trace));
     files.Add("delay.csv", DelayCsv(diagnosis.result().start.curve));
     files.Add("residual_maps.csv", ResidualMapsCsv(diagnosis));
+    if (const auto& frame_times = diagnosis.result().frame_times; !frame_times.empty()) {
+      files.Add("frame_times.csv", FrameTimesCsv(*recording, frame_times));
+    }
     if (diagnosis.after) {
       files.Add("calibration_before.yaml", CalibrationYaml(*diagnosis.before, attitudes));
     }

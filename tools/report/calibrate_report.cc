@@ -1,6 +1,7 @@
 #include "tools/report/calibrate_report.h"
 
 #include "estimator/residual_table.h"
+#include "tools/report/frame_times_section.h"
 #include "tools/report/recording_sections.h"
 #include "tools/report/residual_sections.h"
 
@@ -55,6 +56,7 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
   } else {
     sections.push_back(FitSection(report, attitudes));
   }
+  if (!report.frame_times.empty()) sections.push_back(FrameTimesSection(recording, report));
   sections.push_back(ReproductionSection(run));
   return sections;
 }
