@@ -17,7 +17,7 @@ Calibration StartOf(const Recording& recording, const StartResult& start) {
   return calibration;
 }
 
-std::vector<TimedPair> Spread(std::vector<TimedPair> pairs) {
+std::vector<TimedPair> EvenlyChosen(std::vector<TimedPair> pairs) {
   if (pairs.size() <= kMaxResidualPairs) return pairs;
   std::vector<TimedPair> some;
   for (size_t i = 0; i < kMaxResidualPairs; ++i) {
@@ -38,7 +38,7 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
       ConvergenceSection(report), DelaySection(report.start), RatesSection(recording, calibration)};
   if (!attitudes) {
     const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
-    const std::vector<TimedPair> pairs = Spread(input.pairs);
+    const std::vector<TimedPair> pairs = EvenlyChosen(input.pairs);
     PairGraphOptions options;
     options.match_noise = recording.match_noise;
     options.residual = report.residual;
