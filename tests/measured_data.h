@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 
+#include "tests/paths.h"
+
 namespace camgyro {
 
 // The path of a recording under $CAMGYRO_DATA (default: ../shared/data beside the source), or
@@ -14,7 +16,7 @@ namespace camgyro {
 inline std::optional<std::string> MeasuredData(const std::string& name) {
   const char* root = std::getenv("CAMGYRO_DATA");
   const std::filesystem::path path =
-      std::filesystem::path(root ? root : CAMGYRO_SOURCE_DIR "/../shared/data") / name;
+      std::filesystem::path(root ? root : SourceDir() + "/../shared/data") / name;
   if (!std::filesystem::exists(path)) return std::nullopt;
   return path.string();
 }

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/paths.h"
 #include "tests/tools/run_camgyro.h"
 #include "tools/commands.h"
 #include "tools/report/build_info.h"
@@ -94,7 +95,7 @@ TEST_F(CommandLineTest, DocumentationQuotesTheHelp) {
     std::stringstream help(Run("help " + command.name).out);
     std::string quoted, line;
     while (std::getline(help, line)) quoted += (line.empty() ? "" : "    " + line) + "\n";
-    EXPECT_THAT(ReadFile(CAMGYRO_SOURCE_DIR "/docs/" + command.name + ".md"), HasSubstr(quoted));
+    EXPECT_THAT(ReadFile(SourceDir() + "/docs/" + command.name + ".md"), HasSubstr(quoted));
   }
 }
 

@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string>
 
+#include "tests/paths.h"
 #include "tools/simulation/scenario.h"
 #include "tools/simulation/simulate.h"
 #include "tools/simulation/write_recording.h"
@@ -46,10 +47,9 @@ class CamgyroTest : public testing::Test {
 
   RunResult Run(const std::string& arguments) const {
     const std::string out = Path("stdout.txt"), err = Path("stderr.txt");
-    const int status =
-        std::system(("cd " + root_.string() + " && " CAMGYRO_BINARY_DIR "/tools/camgyro " +
-                     arguments + " >" + out + " 2>" + err)
-                        .c_str());
+    const int status = std::system(("cd " + root_.string() + " && " + BinaryDir() +
+                                    "/tools/camgyro " + arguments + " >" + out + " 2>" + err)
+                                       .c_str());
     RunResult result;
     if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
     result.out = ReadFile(out);

@@ -10,6 +10,7 @@
 
 #include "frontend/readers/read_recording.h"
 #include "tests/frontend/readers/recording_folder.h"
+#include "tests/paths.h"
 
 namespace camgyro {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(RecordingFormats, AreNamedOnceAndDocumented) {
-  std::ifstream in(CAMGYRO_SOURCE_DIR "/docs/recording_format.md");
+  std::ifstream in(SourceDir() + "/docs/recording_format.md");
   const std::string document{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   std::set<std::string> names;
   for (const RecordingFormat& format : RecordingFormats()) {

@@ -15,6 +15,7 @@
 #include "core/time.h"
 #include "frontend/readers/read_recording.h"
 #include "pipeline/read_calibration.h"
+#include "tests/paths.h"
 #include "tests/tools/run_camgyro.h"
 
 namespace camgyro {
@@ -24,7 +25,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-const char kGolden[] = CAMGYRO_SOURCE_DIR "/tests/tools/export/golden/";
+const std::string kGolden = SourceDir() + "/tests/tools/export/golden/";
 
 // The differences of two YAML trees, numbers to 1e-9; keys of `expected` only, or of
 // both.
@@ -66,14 +67,14 @@ class ExportTest : public CamgyroTest {
  protected:
   void SetUp() override {
     CamgyroTest::SetUp();
-    const auto calibration = ReadCalibration(std::string(kGolden) + "calibration.yaml");
+    const auto calibration = ReadCalibration(kGolden + "calibration.yaml");
     ASSERT_TRUE(calibration) << calibration.error().message;
     calibration_ = *calibration;
   }
 
   void Export(const std::string& format, const std::string& more = "") const {
-    const RunResult run = Run("export " + std::string(kGolden) +
-                              "calibration.yaml --format=" + format + " --out=. " + more);
+    const RunResult run =
+        Run("export " + kGolden + "calibration.yaml --format=" + format + " --out=. " + more);
     ASSERT_EQ(run.exit_code, 0) << run.err;
     EXPECT_THAT(run.out, AllOf(HasSubstr("written"), HasSubstr("not determined by the motion"),
                                HasSubstr("cx_px"), HasSubstr("does not hold: clock_skew\n")));
@@ -152,7 +153,7 @@ TEST_F(ExportTest, OpenVins) {
   Export("openvins");
   ExpectLikeGolden("kalibr_imucam_chain.yaml", "kalibr_imucam_chain.yaml");
   ExpectLikeGolden("kalibr_imu_chain.yaml", "kalibr_imu_chain.yaml");
-  std::istringstream words(ReadFile(std::string(kGolden) + "estimator_config_keys.txt"));
+  std::istringstream words(ReadFile(kGolden + "estimator_config_keys.txt"));
   const std::set<std::string> expected{std::istream_iterator<std::string>(words), {}};
   std::set<std::string> keys;
   const YAML::Node config = Load(Path("estimator_config.yaml"));
@@ -316,7 +317,7 @@ TEST_F(ExportTest, GyroflowLogIsReadBack) {
 }
 
 TEST_F(ExportTest, ReversedReadout) {
-  const std::string text = ReadFile(std::string(kGolden) + "calibration.yaml");
+  const std::string text = ReadFile(kGolden + "calibration.yaml");
   std::string reversed = text;
   reversed.replace(reversed.find("0.024"), 5, "-0.024");
   std::ofstream(Path("reversed.yaml")) << reversed;
@@ -330,7 +331,7 @@ TEST_F(ExportTest, ReversedReadout) {
 }
 
 TEST_F(ExportTest, KannalaBrandt) {
-  std::string text = ReadFile(std::string(kGolden) + "calibration.yaml");
+  std::string text = ReadFile(kGolden + "calibration.yaml");
   text.replace(text.find("radtan, value: [-0.28, 0.07, 0.0002, 0.00002]"), 45,
                "kannala_brandt, value: [0.02, -0.01, 0.006, -0.002]");
   std::ofstream(Path("wide.yaml")) << text;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "frontend/readers/read_recording.h"
+#include "tests/paths.h"
 #include "tests/tools/run_camgyro.h"
 #include "tools/report/charts.h"
 #include "tools/report/page.h"
@@ -184,7 +185,7 @@ TEST(Report, TypicalResidualIsASigmaThatOutliersHardlyMove) {
 }
 
 TEST(Report, MatchesLieOnTheirPictures) {
-  const Result<Recording> recording = ReadRecording(CAMGYRO_SOURCE_DIR "/tools/sample");
+  const Result<Recording> recording = ReadRecording(SourceDir() + "/tools/sample");
   ASSERT_TRUE(recording) << recording.error().message;
   std::vector<MatchResidual> residuals(3);
   for (MatchResidual& r : residuals) {

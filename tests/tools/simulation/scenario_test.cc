@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "tests/paths.h"
 #include "tools/simulation/simulate.h"
 
 namespace camgyro::simulation {
@@ -86,7 +87,7 @@ TEST(Scenario, MissingFileIsNamed) {
   EXPECT_THAT(LoadScenario("/nowhere.yaml").error().message, HasSubstr("/nowhere.yaml"));
 }
 
-std::string ScenarioFolder() { return std::string(CAMGYRO_SOURCE_DIR) + "/tools/scenarios"; }
+std::string ScenarioFolder() { return SourceDir() + "/tools/scenarios"; }
 
 TEST(ScenarioFiles, AllLoadAndEffectsAreTheOnesOfTheirName) {
   int effects = 0, files = 0;

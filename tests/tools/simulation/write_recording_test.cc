@@ -10,6 +10,7 @@
 
 #include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
+#include "tests/paths.h"
 #include "tools/simulate_command.h"
 #include "tools/simulation/render.h"
 #include "tools/simulation/trajectory.h"
@@ -178,7 +179,7 @@ TEST_F(WriteRecordingTest, RefusesWithTheFilesName) {
 // tools/sample is what tools/scenarios/demo.yaml makes; the bytes of its video depend on the
 // version of x264.
 TEST(Sample, IsWhatItsScenarioMakes) {
-  const std::string source = CAMGYRO_SOURCE_DIR;
+  const std::string source = SourceDir();
   const Scenario scenario = LoadScenario(source + "/tools/scenarios/demo.yaml").value();
   const Simulated s = SimulateSensors(scenario).value();
   const Result<Recording> sample = ReadRecording(source + "/tools/sample");
