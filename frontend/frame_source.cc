@@ -1,6 +1,7 @@
 #include "frontend/frame_source.h"
 
 #include <cstring>
+#include <filesystem>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -195,10 +196,14 @@ Result<std::unique_ptr<FrameSource>> OpenFrames(const Recording& recording, Pict
     return BadInput(Concat(recording.path, ": has no pictures, expected images or a video"));
   }
   if (recording.video_file.empty()) return std::make_unique<ImageFrames>(recording, format);
-  const RecordingFormat* container = FindFormat(recording.video_file);
-  if (container != nullptr && container->open_frames != nullptr) {
-    if (format == PictureFormat::kGray) return container->open_frames(recording);
-    return BadInput(Concat(recording.path, ": pictures of a bag are read in grey only"));
+  try {
+    const RecordingFormat* container = FindFormat(recording.video_file);
+    if (container != nullptr && container->open_frames != nullptr) {
+      if (format == PictureFormat::kGray) return container->open_frames(recording);
+      return BadInput(Concat(recording.path, ": pictures of a bag are read in grey only"));
+    }
+  } catch (const std::filesystem::filesystem_error& error) {  // of folders that may not be read
+    return BadInput(Concat(recording.video_file, ": ", error.code().message()));
   }
   auto frames = std::make_unique<VideoFrames>(recording, format);
   if (Status status = frames->Open(); !status) return tl::unexpected(status.error());

@@ -17,18 +17,34 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using Read = Result<Recording> (*)(const std::string&);
+
+template <OpenBag open>
+Result<Recording> ReadBagWith(const std::string& path) {
+  return ReadBag(path, open);
+}
+
+using OpenPictures = Result<std::unique_ptr<FrameSource>> (*)(const Recording&);
+
+template <OpenBag open>
+Result<std::unique_ptr<FrameSource>> OpenPicturesWith(const Recording& recording) {
+  return OpenBagFrames(recording, recording.video_file, open);
+}
+
 // The readers that a build may be without (frontend/CMakeLists.txt).
 #ifdef CAMGYRO_WITH_PROTOBUF
-constexpr auto kReadVideoImuCapture = &ReadVideoImuCapture;
+constexpr Read kReadVideoImuCapture = ReadVideoImuCapture;
 #else
-constexpr Result<Recording> (*kReadVideoImuCapture)(const std::string&) = nullptr;
+constexpr Read kReadVideoImuCapture = nullptr;
 #endif
 #ifdef CAMGYRO_WITH_ROSBAG
-constexpr auto kReadRosbag = &ReadRosbag;
-constexpr auto kOpenRosbagFrames = &OpenRosbagFrames;
+constexpr Read kReadRosbag = ReadBagWith<OpenRosbag>;
+constexpr OpenPictures kOpenRosbagPictures = OpenPicturesWith<OpenRosbag>;
+constexpr OpenBag kOpenRosbag = OpenRosbag;
 #else
-constexpr Result<Recording> (*kReadRosbag)(const std::string&) = nullptr;
-constexpr Result<std::unique_ptr<FrameSource> > (*kOpenRosbagFrames)(const Recording&) = nullptr;
+constexpr Read kReadRosbag = nullptr;
+constexpr OpenPictures kOpenRosbagPictures = nullptr;
+constexpr OpenBag kOpenRosbag = nullptr;
 #endif
 
 bool HasFile(const std::string& folder, const char* name) {
@@ -54,7 +70,8 @@ const std::vector<RecordingFormat>& RecordingFormats() {
       {"OpenCamera Sensors", "a folder with VIDEO_gyro.csv and VIDEO_timestamps.csv", IsOpenCamera,
        ReadOpenCamera},
       {"ROS 1 bag", "X.bag", [](const std::string& path) { return EndsWith(path, ".bag"); },
-       kReadRosbag, "librosbag-storage-dev and libsensor-msgs-dev", kOpenRosbagFrames},
+       kReadRosbag, "librosbag-storage-dev and libsensor-msgs-dev", kOpenRosbagPictures,
+       kOpenRosbag},
       {"Gyroflow", "X.gcsv, or a video with X.gcsv beside it", IsGcsv, ReadGcsv},
       {"GoPro MP4", "a video with GPMF telemetry inside",
        [](const std::string& path) { return fs::is_regular_file(path); }, ReadGoPro},

@@ -10,6 +10,7 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "frontend/frame_source.h"
+#include "frontend/readers/bag.h"
 
 namespace camgyro {
 
@@ -25,6 +26,7 @@ struct RecordingFormat {
   // The pictures of a recording whose video_file is of this format. Null where they are images, or
   // a video that FFmpeg decodes. The recording must outlive the source.
   Result<std::unique_ptr<FrameSource>> (*open_frames)(const Recording& recording) = nullptr;
+  OpenBag open_bag = nullptr;  // null where it is no bag
 };
 
 const std::vector<RecordingFormat>& RecordingFormats();

@@ -10,14 +10,9 @@
 #include <vector>
 
 #include "core/result.h"
+#include "frontend/readers/bytes.h"
 
 namespace camgyro {
-
-// Bytes that someone else owns.
-struct ByteView {
-  const uint8_t* data = nullptr;
-  size_t size = 0;
-};
 
 // One item: key (four characters), type, `repeat` samples of `sample_size` bytes. Type 0: nested.
 struct GpmfItem {

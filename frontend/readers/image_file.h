@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/result.h"
+#include "frontend/readers/bytes.h"
 
 namespace camgyro {
 
@@ -13,6 +14,8 @@ namespace camgyro {
 // An image that cannot be decoded, or is cut short, is an error. OpenCV alone fills up the missing
 // part of a half-written JPEG with grey and reports success.
 Result<cv::Mat> ReadGrayImage(const std::string& file);
+// The same of an image that is in memory.
+Result<cv::Mat> DecodeGrayImage(ByteView bytes);
 // The same with three channels, blue first; grey images have three equal ones.
 Result<cv::Mat> ReadColourImage(const std::string& file);
 
