@@ -11,6 +11,7 @@ packages=(
   libeigen3-dev libceres-dev libsuitesparse-dev libgflags-dev libgoogle-glog-dev
   libopencv-dev libavformat-dev libavcodec-dev libswscale-dev libavutil-dev
   libyaml-cpp-dev nlohmann-json3-dev libexpected-dev libfast-float-dev
+  libsqlite3-dev liblz4-dev libzstd-dev
   # optional: recordings of VideoIMUCapture
   libprotobuf-dev protobuf-compiler
   # Python module

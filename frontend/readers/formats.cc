@@ -7,6 +7,7 @@
 #include "frontend/readers/gopro_reader.h"
 #include "frontend/readers/mars_logger_reader.h"
 #include "frontend/readers/open_camera_reader.h"
+#include "frontend/readers/ros2_bag_reader.h"
 #include "frontend/readers/rosbag_reader.h"
 #include "frontend/readers/sensor_logger_reader.h"
 #include "frontend/readers/text.h"
@@ -69,6 +70,8 @@ const std::vector<RecordingFormat>& RecordingFormats() {
        ReadSensorLogger},
       {"OpenCamera Sensors", "a folder with VIDEO_gyro.csv and VIDEO_timestamps.csv", IsOpenCamera,
        ReadOpenCamera},
+      {"ROS 2 bag", "X.db3, X.mcap, or a folder of them with metadata.yaml", IsRos2Bag,
+       ReadBagWith<OpenRos2Bag>, "", OpenPicturesWith<OpenRos2Bag>, OpenRos2Bag},
       {"ROS 1 bag", "X.bag", [](const std::string& path) { return EndsWith(path, ".bag"); },
        kReadRosbag, "librosbag-storage-dev and libsensor-msgs-dev", kOpenRosbagPictures,
        kOpenRosbag},
