@@ -10,10 +10,10 @@
 namespace camgyro {
 namespace {
 
-void Split(std::string_view text, std::vector<std::string_view>* cells) {
+void Split(std::string_view text, char separator, std::vector<std::string_view>* cells) {
   cells->clear();
   for (size_t begin = 0;;) {
-    const size_t comma = text.find(',', begin);
+    const size_t comma = text.find(separator, begin);
     cells->push_back(Trim(text.substr(begin, comma - begin)));
     if (comma == std::string_view::npos) return;
     begin = comma + 1;
@@ -47,7 +47,7 @@ CsvReader::CsvReader(const std::string& file, std::vector<std::string> columns,
   if (!NextLine(&text)) return;
   const bool marked = text.front() == '#';
   if (marked) text.remove_prefix(1);
-  Split(text, &cells_);
+  Split(text, separator_, &cells_);
   if (marked || std::none_of(cells_.begin(), cells_.end(), IsNumber)) {
     header_.assign(cells_.begin(), cells_.end());
   } else {
@@ -63,22 +63,7 @@ CsvReader CsvReader::ByName(const std::string& file, int skip_lines) {
     csv.position_ = std::min(csv.content_.find('\n', csv.position_), csv.content_.size()) + 1;
     ++csv.line_;
   }
-  for (;;) {
-    const size_t begin = csv.position_;
-    const int line = csv.line_;
-    if (!csv.NextLine(&text)) break;
-    const bool marked = text.front() == '#';
-    if (marked) text.remove_prefix(1);
-    Split(text, &csv.cells_);
-    const bool numbers = std::any_of(csv.cells_.begin(), csv.cells_.end(), IsNumber);
-    if (marked || !numbers) csv.header_.assign(csv.cells_.begin(), csv.cells_.end());
-    if (marked) continue;
-    if (numbers) {
-      csv.position_ = begin;
-      csv.line_ = line;
-    }
-    break;
-  }
+  csv.FindHeader();
   if (csv.header_.empty()) {
     if (csv.status_) csv.status_ = BadInput(Concat(file, ": expected a header of column names"));
     return csv;
@@ -86,6 +71,53 @@ CsvReader CsvReader::ByName(const std::string& file, int skip_lines) {
   csv.columns_ = csv.header_;
   csv.widths_ = {csv.header_.size()};
   return csv;
+}
+
+void CsvReader::FindHeader() {
+  std::string_view text;
+  for (;;) {
+    const size_t begin = position_;
+    const int line = line_;
+    if (!NextLine(&text)) break;
+    const bool marked = text.front() == '#';
+    if (marked) text.remove_prefix(1);
+    Split(text, separator_, &cells_);
+    const bool numbers = std::any_of(cells_.begin(), cells_.end(), IsNumber);
+    if (marked || !numbers) header_.assign(cells_.begin(), cells_.end());
+    if (marked) continue;
+    if (numbers) {
+      position_ = begin;
+      line_ = line;
+    }
+    break;
+  }
+}
+
+CsvReader CsvReader::Described(const std::string& file, char separator) {
+  CsvReader csv(file);
+  csv.separator_ = separator;
+  csv.FindHeader();
+  size_t width = csv.NextWidth();
+  if (width == 0) width = csv.header_.size();
+  if (csv.header_.size() != width) csv.header_.clear();  // a remark
+  csv.columns_ = csv.header_;
+  while (csv.columns_.size() < width) {
+    csv.columns_.push_back("column " + std::to_string(csv.columns_.size() + 1));
+  }
+  csv.widths_ = {width};
+  return csv;
+}
+
+size_t CsvReader::NamedOrNumbered(const std::string& name) {
+  size_t number = 0;
+  if (!HasColumn(name) && ParseNumber(std::string_view(name), &number)) {
+    if (number >= 1 && number <= columns_.size()) return number - 1;
+    if (status_) {
+      status_ = BadInput(Concat(file_, ": has ", columns_.size(), " columns, no number ", name));
+    }
+    return 0;
+  }
+  return Column({name});
 }
 
 size_t CsvReader::Column(const std::vector<std::string>& names) {
@@ -124,7 +156,7 @@ size_t CsvReader::NextWidth() {
   size_t next_width = 0;
   while (status_ && next_width == 0 && NextLine(&text)) {
     if (text.front() == '#') continue;
-    next_width = static_cast<size_t>(std::count(text.begin(), text.end(), ',')) + 1;
+    next_width = static_cast<size_t>(std::count(text.begin(), text.end(), separator_)) + 1;
   }
   position_ = position;
   line_ = line;
@@ -136,7 +168,7 @@ bool CsvReader::NextRow() {
   do {
     if (!status_ || !NextLine(&text)) return false;
   } while (text.front() == '#');
-  Split(text, &cells_);
+  Split(text, separator_, &cells_);
 
   if (file_width_ == 0 && std::count(widths_.begin(), widths_.end(), width()) > 0) {
     file_width_ = width();
@@ -160,20 +192,26 @@ int64_t CsvReader::Integer(size_t column, const char* expected) {
   return value;
 }
 
-int64_t CsvReader::Time(size_t column, double unit_s) {
+int64_t CsvReader::Time(size_t column, double unit_s, int64_t offset_ns) {
   constexpr double kLargestNs = 9.2e18;  // of int64_t, 292 years
   const double unit_ns = unit_s * 1e9, whole_ns = std::round(unit_ns);
-  int64_t whole = 0;
-  if (whole_ns == 1.0) return Stamp(column);
-  const double value = Number(column);
-  if (!(std::abs(value) * unit_ns < kLargestNs)) {
-    FailCell(column, "a time below 292 years");
-    return 0;
+  int64_t whole = 0, stamp_ns = 0;
+  if (whole_ns == 1.0) {
+    stamp_ns = Stamp(column);
+  } else {
+    const double value = Number(column);
+    if (!(std::abs(value) * unit_ns < kLargestNs)) {
+      FailCell(column, "a time below 292 years");
+      return 0;
+    }
+    const bool is_whole = std::abs(unit_ns - whole_ns) < 1e-9 * unit_ns;
+    stamp_ns = is_whole && ParseNumber(cells_[column], &whole)
+                   ? whole * static_cast<int64_t>(whole_ns)
+                   : std::llround(value * unit_ns);
   }
-  if (std::abs(unit_ns - whole_ns) < 1e-9 * unit_ns && ParseNumber(cells_[column], &whole)) {
-    return whole * static_cast<int64_t>(whole_ns);
-  }
-  return std::llround(value * unit_ns);
+  if (!__builtin_add_overflow(stamp_ns, offset_ns, &stamp_ns)) return stamp_ns;
+  FailCell(column, "a time below 292 years");
+  return 0;
 }
 
 double CsvReader::Number(size_t column) {

@@ -31,6 +31,13 @@ class CsvReader {
   // it. Rows have the header's width.
   static CsvReader ByName(const std::string& file, int skip_lines = 0);
 
+  // A table of which somebody says where its columns are: cells between separators of any kind; the
+  // header, if there is one, as of ByName. Without one the columns are called by their numbers.
+  static CsvReader Described(const std::string& file, char separator);
+
+  // Of Described: the column with this name, or of this number, from 1; an error and 0 otherwise.
+  size_t NamedOrNumbered(const std::string& name);
+
   // Of ByName: the index of the column with one of these names; an error and 0 if there is none.
   size_t Column(const std::vector<std::string>& names);
   bool HasColumn(const std::string& name) const;
@@ -47,8 +54,9 @@ class CsvReader {
   std::string_view Cell(size_t column) const { return cells_[column]; }
   int64_t Stamp(size_t column) { return Integer(column, "an integer number of nanoseconds"); }
   int64_t Integer(size_t column, const char* expected = "an integer");
-  // A time in units of `unit_s` as nanoseconds; exact if it is written as an integer.
-  int64_t Time(size_t column, double unit_s);
+  // A time in units of `unit_s`, plus an offset, as nanoseconds; exact if it is written as an
+  // integer and the unit is of whole nanoseconds.
+  int64_t Time(size_t column, double unit_s, int64_t offset_ns = 0);
   double Number(size_t column);  // finite
 
   // Records an error of the current row; the file and the line are put in front.
@@ -57,10 +65,12 @@ class CsvReader {
 
  private:
   explicit CsvReader(const std::string& file);  // reads the content only
+  void FindHeader();
   bool NextLine(std::string_view* text);
   void FailCell(size_t column, const std::string& expected);
 
   std::string file_;
+  char separator_ = ',';
   std::vector<std::string> columns_;
   std::vector<size_t> widths_;
   std::string content_;

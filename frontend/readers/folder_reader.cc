@@ -11,6 +11,7 @@
 #include "frontend/readers/camera_csv.h"
 #include "frontend/readers/image_file.h"
 #include "frontend/readers/imu_csv.h"
+#include "frontend/readers/inside_folder.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sensor_yaml.h"
 #include "frontend/readers/text.h"
@@ -36,12 +37,13 @@ CameraFiles FindCameraFiles(const fs::path& cam) {
 
 Status AddImages(const CameraFiles& files, const FrameTable& table, Recording* recording) {
   for (size_t i = 0; i < table.frames.size(); ++i) {
-    const std::string image = (fs::path(files.images) / table.frames[i].image_file).string();
-    if (!fs::is_regular_file(image)) {
-      return BadInput(Concat(files.data, ":", table.lines[i], ": ", image,
-                             " does not exist, expected an image"));
+    const std::string line = Concat(files.data, ":", table.lines[i]);
+    const auto image = PathInside(files.images, table.frames[i].image_file, line);
+    if (!image) return tl::unexpected(image.error());
+    if (!fs::is_regular_file(*image)) {
+      return BadInput(Concat(line, ": ", *image, " does not exist, expected an image"));
     }
-    recording->frames[i].image_file = image;
+    recording->frames[i].image_file = *image;
   }
   const std::string& first = recording->frames.front().image_file;
   const Result<cv::Mat> image = ReadGrayImage(first);

@@ -9,6 +9,7 @@
 
 #include "frontend/readers/add_pictures.h"
 #include "frontend/readers/csv_reader.h"
+#include "frontend/readers/inside_folder.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sample_rows.h"
 #include "frontend/readers/text.h"
@@ -17,8 +18,6 @@ namespace camgyro {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kStandardGravity = 9.80665;
 
 // The lines before the table: `key,value`.
 struct GcsvHead {
@@ -117,10 +116,14 @@ Status ReadTable(const std::string& file, const GcsvHead& head, Recording* recor
 }
 
 Result<std::string> FindVideo(const std::string& log, const GcsvHead& head) {
-  const fs::path folder = fs::path(log).parent_path();
+  const std::string folder = fs::path(log).parent_path().string();
   std::vector<fs::path> candidates;
   const auto named = head.entries.find("videofilename");
-  if (named != head.entries.end()) candidates.push_back(folder / named->second.value);
+  if (named != head.entries.end()) {
+    // A path of the machine that wrote the log says nothing here.
+    const auto inside = PathInside(folder, named->second.value, log);
+    if (inside) candidates.push_back(*inside);
+  }
   for (const char* extension : {".mp4", ".MP4", ".mov", ".MOV"}) {
     candidates.push_back(fs::path(log).replace_extension(extension));
   }

@@ -87,16 +87,7 @@ Result<std::map<int64_t, Capture>> ReadCaptures(const std::string& file) {
 Status ReadFrameStamps(const std::string& file, Recording* recording) {
   CsvReader csv = CsvReader::ByName(file);
   const TimeColumn time = FindTime("Frame timestamp", &csv);
-  while (csv.NextRow()) {
-    Frame frame;
-    frame.stamp_ns = csv.Time(time.index, time.unit_s);
-    if (!recording->frames.empty()) {
-      const auto wrong = NotIncreasing(recording->frames.back().stamp_ns, frame.stamp_ns);
-      if (wrong) csv.Fail(*wrong);
-    }
-    if (!csv.status()) break;
-    recording->frames.push_back(frame);
-  }
+  while (csv.NextRow()) AddFrame(csv.Time(time.index, time.unit_s), &csv, recording);
   return csv.status();
 }
 

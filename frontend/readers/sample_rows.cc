@@ -1,6 +1,9 @@
 #include "frontend/readers/sample_rows.h"
 
+#include <cmath>
+
 #include "frontend/readers/recording_checks.h"
+#include "frontend/readers/text.h"
 
 namespace camgyro {
 namespace {
@@ -9,17 +12,38 @@ Eigen::Vector3d Vector(const std::array<size_t, 3>& columns, CsvReader* csv) {
   return {csv->Number(columns[0]), csv->Number(columns[1]), csv->Number(columns[2])};
 }
 
+int64_t ReadStamp(const SampleColumns& columns, CsvReader* csv) {
+  return csv->Time(columns.time, columns.time_unit_s, columns.time_offset_ns);
+}
+
 }  // namespace
 
 std::array<size_t, 3> VectorColumns(const std::array<const char*, 3>& names, CsvReader* csv) {
   return {csv->Column({names[0]}), csv->Column({names[1]}), csv->Column({names[2]})};
 }
 
+Eigen::Quaterniond ReadQuaternion(size_t w, const std::array<size_t, 3>& xyz, CsvReader* csv) {
+  const Eigen::Quaterniond q(csv->Number(w), csv->Number(xyz[0]), csv->Number(xyz[1]),
+                             csv->Number(xyz[2]));
+  if (csv->status() && std::abs(q.norm() - 1.0) > 1e-3) {
+    csv->Fail(Concat("the quaternion's norm is ", q.norm(), ", expected 1 within 0.001"));
+  }
+  return csv->status() ? q.normalized() : Eigen::Quaterniond::Identity();
+}
+
+void AddFrame(int64_t stamp_ns, CsvReader* csv, Recording* recording) {
+  std::vector<Frame>& frames = recording->frames;
+  if (csv->status() && !frames.empty()) {
+    if (const auto wrong = NotIncreasing(frames.back().stamp_ns, stamp_ns)) csv->Fail(*wrong);
+  }
+  frames.emplace_back().stamp_ns = stamp_ns;
+}
+
 Status ReadGyroRows(const std::string& file, const SampleColumns& columns, CsvReader* csv,
                     Recording* recording) {
   GyroCollector gyro(recording);
   while (csv->NextRow()) {
-    const int64_t stamp_ns = csv->Time(columns.time, columns.time_unit_s);
+    const int64_t stamp_ns = ReadStamp(columns, csv);
     const Eigen::Vector3d rates = columns.gyro_map * Vector(columns.gyro, csv);
     std::optional<Eigen::Vector3d> accel;
     if (columns.accel) accel = columns.accel_map * Vector(*columns.accel, csv);
@@ -32,7 +56,7 @@ Status ReadGyroRows(const std::string& file, const SampleColumns& columns, CsvRe
 
 Status ReadAccelRows(const SampleColumns& columns, CsvReader* csv, Recording* recording) {
   while (csv->NextRow()) {
-    const int64_t stamp_ns = csv->Time(columns.time, columns.time_unit_s);
+    const int64_t stamp_ns = ReadStamp(columns, csv);
     const Eigen::Vector3d accel = columns.accel_map * Vector(*columns.accel, csv);
     if (csv->status() && !recording->accel.empty()) {
       const auto wrong = NotIncreasing(recording->accel.back().stamp_ns, stamp_ns);

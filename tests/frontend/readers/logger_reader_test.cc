@@ -8,10 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
-#include "tests/frontend/readers/recording_folder.h"
-#include "tests/frontend/readers/write_video.h"
+#include "tests/frontend/readers/logger_folder.h"
 
 namespace camgyro {
 namespace {
@@ -19,50 +17,6 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-using Files = std::map<std::string, std::string>;
-
-// A folder beside which nothing else is; three pictures, 40 ms apart, where a video is asked for.
-class LoggerFolder {
- public:
-  void Write(const Files& files) const { folder_.Write(files); }
-  void WriteVideo(const std::string& name, int frames = 3) const {
-    VideoSpec spec;
-    spec.pictures.assign(static_cast<size_t>(frames), cv::Mat(48, 64, CV_8UC1, cv::Scalar(90)));
-    std::filesystem::create_directories(std::filesystem::path(File(name)).parent_path());
-    ASSERT_TRUE(camgyro::WriteVideo(File(name), spec));
-  }
-  void Remove(const std::string& name) const { folder_.Remove("log/" + name); }
-  std::string File(const std::string& name) const { return folder_.File("log/" + name); }
-  std::string path() const { return folder_.File("log"); }
-
-  RecordingFolder folder_;
-};
-
-Files In(const std::string& root, const Files& files) {
-  Files moved;
-  for (const auto& [name, text] : files) moved[root + "/" + name] = text;
-  return moved;
-}
-
-std::vector<int64_t> Stamps(const Recording& recording) {
-  std::vector<int64_t> stamps;
-  for (const Frame& frame : recording.frames) stamps.push_back(frame.stamp_ns);
-  return stamps;
-}
-
-// The pictures can be decoded, as many as there are frames.
-void ExpectPictures(const Recording& recording) {
-  auto source = OpenFrames(recording);
-  ASSERT_TRUE(source) << source.error().message;
-  cv::Mat picture;
-  for (size_t i = 0; i < recording.frames.size(); ++i) {
-    const Result<bool> next = (*source)->Next(&picture);
-    ASSERT_TRUE(next) << next.error().message;
-    ASSERT_TRUE(*next);
-    EXPECT_EQ(picture.size(), cv::Size(64, 48));
-  }
-}
 
 const Files kGcsv = {
     {"a.gcsv",
@@ -101,6 +55,21 @@ TEST(GcsvReader, FindsTheVideoByItsName) {
   const Result<Recording> recording = ReadRecording(folder.File("a.gcsv"));
   ASSERT_TRUE(recording) << recording.error().message;
   EXPECT_EQ(recording->video_file, folder.File("clip.mov"));
+}
+
+// A name that leads out of the folder is not followed: it is of the machine that wrote the log.
+TEST(GcsvReader, FindsTheVideoInItsFolderOnly) {
+  const LoggerFolder folder;
+  folder.WriteVideo("../outside.mov");
+  folder.WriteVideo("a.mp4");
+  for (const std::string& name : {std::string("../outside.mov"), folder.File("../outside.mov")}) {
+    Files files = kGcsv;
+    files["a.gcsv"].replace(files["a.gcsv"].find("note,"), 5, "videofilename," + name + "\nnote,");
+    folder.Write(In("log", files));
+    const Result<Recording> recording = ReadRecording(folder.File("a.gcsv"));
+    ASSERT_TRUE(recording) << recording.error().message;
+    EXPECT_EQ(recording->video_file, folder.File("a.mp4"));
+  }
 }
 
 // Microseconds that are integers stay exact.
