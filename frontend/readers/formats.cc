@@ -5,11 +5,14 @@
 #include "frontend/readers/folder_reader.h"
 #include "frontend/readers/gcsv_reader.h"
 #include "frontend/readers/gopro_reader.h"
+#include "frontend/readers/ios_logger_reader.h"
+#include "frontend/readers/jsonl_reader.h"
 #include "frontend/readers/mars_logger_reader.h"
 #include "frontend/readers/open_camera_reader.h"
 #include "frontend/readers/ros2_bag_reader.h"
 #include "frontend/readers/rosbag_reader.h"
 #include "frontend/readers/sensor_logger_reader.h"
+#include "frontend/readers/stray_scanner_reader.h"
 #include "frontend/readers/text.h"
 #include "frontend/readers/video_imu_capture_reader.h"
 
@@ -66,6 +69,11 @@ const std::vector<RecordingFormat>& RecordingFormats() {
        [](const std::string& path) { return HasFile(path, "video_meta.pb3"); },
        kReadVideoImuCapture, "libprotobuf-dev and protobuf-compiler"},
       {"MARSLogger", "a folder with gyro_accel.csv", IsMarsLogger, ReadMarsLogger},
+      {"Stray Scanner", "a folder with imu.csv and odometry.csv", IsStrayScanner, ReadStrayScanner},
+      {"ios_logger", "a folder with Gyro.txt and Frames.txt or ARposes.txt", IsIosLogger,
+       ReadIosLogger},
+      {"JSON lines", "a folder with data.jsonl and data.mp4 (android-viotester, ...)", IsJsonl,
+       ReadJsonl},
       {"Sensor Logger", "a folder with Gyroscope.csv or GyroscopeUncalibrated.csv", IsSensorLogger,
        ReadSensorLogger},
       {"OpenCamera Sensors", "a folder with VIDEO_gyro.csv and VIDEO_timestamps.csv", IsOpenCamera,
