@@ -9,6 +9,7 @@
 #include "frontend/readers/jsonl_reader.h"
 #include "frontend/readers/mars_logger_reader.h"
 #include "frontend/readers/open_camera_reader.h"
+#include "frontend/readers/recording_yaml_reader.h"
 #include "frontend/readers/ros2_bag_reader.h"
 #include "frontend/readers/rosbag_reader.h"
 #include "frontend/readers/sensor_logger_reader.h"
@@ -65,6 +66,8 @@ const std::vector<RecordingFormat>& RecordingFormats() {
   static const std::vector<RecordingFormat> formats = {
       {"EuRoC/ASL folder", "a folder with cam0/ and imu0/, or mav0/ with them inside", IsOwnFolder,
        ReadFolder},
+      {"recording.yaml", "a file recording.yaml that describes other files", IsRecordingYaml,
+       ReadRecordingYaml, "", OpenRecordingYamlFrames},
       {"VideoIMUCapture", "a folder with video_meta.pb3",
        [](const std::string& path) { return HasFile(path, "video_meta.pb3"); },
        kReadVideoImuCapture, "libprotobuf-dev and protobuf-compiler"},

@@ -8,78 +8,12 @@
 #include <vector>
 
 #include "frontend/readers/text.h"
+#include "frontend/readers/yaml_keys.h"
 
 namespace camgyro {
 namespace {
 
-// Typed look-ups in one file. The first error sticks, as in CsvReader.
-class Keys {
- public:
-  Keys(std::string file, YAML::Node root) : file_(std::move(file)), root_(std::move(root)) {}
-
-  const Status& status() const { return status_; }
-
-  void Fail(const std::string& key, const std::string& message) {
-    if (!status_) return;
-    const YAML::Node node = root_[key];
-    const std::string line = node && node.Mark().line >= 0 ? Concat(":", node.Mark().line + 1) : "";
-    status_ = BadInput(Concat(file_, line, ": ", key, ": ", message));
-  }
-
-  std::optional<std::string> Text(const std::string& key) {
-    const YAML::Node node = root_[key];
-    if (!node || node.IsNull()) return std::nullopt;
-    if (!node.IsScalar()) {
-      Fail(key, "expected a word");
-      return std::nullopt;
-    }
-    return node.Scalar();
-  }
-
-  std::optional<double> Number(const std::string& key) {
-    const YAML::Node node = root_[key];
-    if (!node || node.IsNull()) return std::nullopt;
-    double value = 0.0;
-    if (!node.IsScalar() || !ParseNumber(std::string_view(node.Scalar()), &value) ||
-        !std::isfinite(value)) {
-      Fail(key, Concat("'", node.IsScalar() ? node.Scalar() : "a list or map",
-                       "' was found, expected a finite number"));
-      return std::nullopt;
-    }
-    return value;
-  }
-
-  std::optional<double> PositiveNumber(const std::string& key) {
-    const std::optional<double> value = Number(key);
-    if (value && *value <= 0.0) Fail(key, Concat(*value, " was found, expected more than zero"));
-    return value;
-  }
-
-  // The numbers of a list, or of the `data` of a matrix.
-  std::optional<std::vector<double>> Numbers(const std::string& key, const std::string& expected) {
-    YAML::Node node = root_[key];
-    if (!node || node.IsNull()) return std::nullopt;
-    if (node.IsMap()) node.reset(node["data"]);
-    std::vector<double> values;
-    bool good = node && node.IsSequence();
-    for (size_t i = 0; good && i < node.size(); ++i) {
-      double value = 0.0;
-      good = node[i].IsScalar() && ParseNumber(std::string_view(node[i].Scalar()), &value) &&
-             std::isfinite(value);
-      values.push_back(value);
-    }
-    if (good) return values;
-    Fail(key, "expected " + expected);
-    return std::nullopt;
-  }
-
- private:
-  std::string file_;
-  const YAML::Node root_;
-  Status status_;
-};
-
-void ReadResolution(Keys* keys, CameraGuess* camera) {
+void ReadResolution(YamlKeys* keys, CameraGuess* camera) {
   const char* expected = "[width, height], two whole numbers of pixels above zero";
   const auto size = keys->Numbers("resolution", expected);
   if (!size) return;
@@ -92,7 +26,7 @@ void ReadResolution(Keys* keys, CameraGuess* camera) {
   camera->height_px = static_cast<int>((*size)[1]);
 }
 
-void ReadIntrinsics(Keys* keys, CameraGuess* camera) {
+void ReadIntrinsics(YamlKeys* keys, CameraGuess* camera) {
   const auto model = keys->Text("camera_model");
   if (model && *model != "pinhole") {
     keys->Fail("camera_model", Concat("'", *model, "' is not supported, expected pinhole"));
@@ -109,7 +43,7 @@ void ReadIntrinsics(Keys* keys, CameraGuess* camera) {
   camera->principal_px = Eigen::Vector2d((*values)[2], (*values)[3]);
 }
 
-void ReadDistortion(Keys* keys, CameraGuess* camera) {
+void ReadDistortion(YamlKeys* keys, CameraGuess* camera) {
   const std::string model = keys->Text("distortion_model").value_or("");
   const auto values = keys->Numbers("distortion_coefficients", "a list of numbers");
   if (model.empty() || model == "none") {
@@ -148,7 +82,7 @@ void ReadDistortion(Keys* keys, CameraGuess* camera) {
   camera->distortion.assign(values->begin(), values->begin() + 4);
 }
 
-std::optional<Eigen::Quaterniond> ReadRotation(Keys* keys) {
+std::optional<Eigen::Quaterniond> ReadRotation(YamlKeys* keys) {
   const char* expected = "a map with `data`, the 16 numbers of a 4x4 matrix, row by row";
   const auto values = keys->Numbers("T_BS", expected);
   if (!values) return std::nullopt;
@@ -184,7 +118,7 @@ Result<SensorYaml> ReadSensorYaml(const std::string& file) {
     const YAML::Node root = YAML::Load(text);
     if (root.IsNull()) return result;
     if (!root.IsMap()) return BadInput(Concat(file, ":1: expected lines of `key: value`"));
-    Keys keys(file, root);
+    YamlKeys keys(file, root);
     ReadResolution(&keys, &result.camera);
     ReadIntrinsics(&keys, &result.camera);
     ReadDistortion(&keys, &result.camera);
