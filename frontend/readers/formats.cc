@@ -1,6 +1,7 @@
 #include "frontend/readers/formats.h"
 
 #include <filesystem>
+#include <fstream>
 
 #include "frontend/readers/folder_reader.h"
 #include "frontend/readers/gcsv_reader.h"
@@ -57,7 +58,20 @@ bool HasFile(const std::string& folder, const char* name) {
 }
 
 bool IsOwnFolder(const std::string& path) {
-  return fs::is_directory(fs::path(path) / "cam0") || fs::is_directory(fs::path(path) / "mav0");
+  for (const char* part : {"cam0", "imu0", "mav0"}) {
+    if (fs::is_directory(fs::path(path) / part)) return true;
+  }
+  return false;
+}
+
+// ISO 14496-12 and QuickTime: the name of the first box, behind its size.
+bool IsMp4(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  char head[8] = {};
+  in.read(head, sizeof head);
+  const std::string name(head + 4, 4);
+  return in && (name == "ftyp" || name == "moov" || name == "mdat" || name == "wide" ||
+                name == "free" || name == "skip");
 }
 
 }  // namespace
@@ -87,8 +101,7 @@ const std::vector<RecordingFormat>& RecordingFormats() {
        kReadRosbag, "librosbag-storage-dev and libsensor-msgs-dev", kOpenRosbagPictures,
        kOpenRosbag},
       {"Gyroflow", "X.gcsv, or a video with X.gcsv beside it", IsGcsv, ReadGcsv},
-      {"GoPro MP4", "a video with GPMF telemetry inside",
-       [](const std::string& path) { return fs::is_regular_file(path); }, ReadGoPro},
+      {"GoPro MP4", "a video with GPMF telemetry inside", IsMp4, ReadGoPro},
   };
   return formats;
 }

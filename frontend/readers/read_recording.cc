@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "frontend/readers/folder_reader.h"
 #include "frontend/readers/formats.h"
 #include "frontend/readers/text.h"
 #include "frontend/stamp_clock.h"
@@ -20,7 +19,12 @@ Result<Recording> ReadAsRecorded(const std::string& path) {
                              ListFormats()));
     }
     const RecordingFormat* format = FindFormat(path);
-    if (format == nullptr) return ReadFolder(path);  // for its complaint
+    if (format == nullptr) {
+      return BadInput(Concat(path,
+                             ": not a recording of a known format (docs/recording_format.md), "
+                             "which are ",
+                             ListFormats()));
+    }
     if (Status built = CheckBuilt(*format, path); !built) return tl::unexpected(built.error());
     return format->read(path);
   } catch (const fs::filesystem_error& error) {  // of folders that may not be read

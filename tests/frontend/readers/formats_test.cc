@@ -30,11 +30,18 @@ TEST(RecordingFormats, AreNamedOnceAndDocumented) {
 
 TEST(RecordingFormats, AreToldByTheirFiles) {
   const RecordingFolder folder;  // with cam0/ and imu0/
+  folder.Write({{"stray/odometry.csv", ""}, {"ios/Frames.txt", ""}});
   const std::pair<const char*, const char*> cases[] = {
       {"", "EuRoC/ASL folder"},
       {"capture/video_meta.pb3", "VideoIMUCapture"},
       {"mars/gyro_accel.csv", "MARSLogger"},
       {"sensors/Gyroscope.csv", "Sensor Logger"},
+      {"stray/imu.csv", "Stray Scanner"},
+      {"ios/Gyro.txt", "ios_logger"},
+      {"lines/data.jsonl", "JSON lines"},
+      {"described/recording.yaml", "recording.yaml"},
+      {"bag/a_0.db3", "ROS 2 bag"},
+      {"clip.mcap", "ROS 2 bag"},
       {"clip.bag", "ROS 1 bag"},
       {"clip.gcsv", "Gyroflow"},
   };

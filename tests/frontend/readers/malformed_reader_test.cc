@@ -67,6 +67,10 @@ const Malformed kMalformed[] = {
   {"FrameNameInSomeRows", "cam0/data.csv", "1000000000,a.png\n1033000000,\n", {"cam0/data.csv:2:", "filename", "expected a name in every row"}},
   {"FrameImageMissing", "cam0/data.csv", "#t,f\n1000000000,a.png\n1033000000,b.png\n",
    {"cam0/data.csv:3:", "cam0/data/b.png does not exist", "expected an image"}},
+  {"FrameImageOutside", "cam0/data.csv", "#t,f\n1000000000,a.png\n1033000000,../../secret.png\n",
+   {"cam0/data.csv:3:", "names the file '../../secret.png'", "expected one inside of the recording's folder"}},
+  {"FrameImageAbsolute", "cam0/data.csv", "#t,f\n1000000000,/etc/passwd\n1033000000,a.png\n",
+   {"cam0/data.csv:2:", "names the file '/etc/passwd'"}},
   {"FrameExposureInNanoseconds", "cam0/data.csv", "1000000000,,5000000\n1033000000,,0.005\n",
    {"cam0/data.csv:1:", "exposure [s]", "5e+06 s", "expected seconds"}},
   {"FrameStampsInMicroseconds", "cam0/data.csv", "1000000\n1003300\n1006600\n", {"cam0: ", "3300 ns", "expected stamps in nanoseconds"}},
@@ -174,11 +178,17 @@ TEST(MalformedRecording, ImageThatIsNone) {
 
 TEST(MalformedRecording, PathsThatAreNoRecording) {
   const RecordingFolder folder;
-  folder.Write("other/readme.txt", "hello");
+  folder.Write({{"other/readme.txt", "hello"},
+                {"video.mp4", std::string("\0\0\0\x10"
+                                          "ftypmp42",
+                                          12)},
+                {"half/imu0/data.csv", ""}});
   const std::pair<std::string, std::string> cases[] = {
       {folder.File("nowhere"), "does not exist"},
-      {folder.File("other"), "has no folder cam0/; expected a recording with cam0/ and imu0/"},
-      {folder.File("other/readme.txt"), "cannot be read as a video"}};
+      {folder.File("other"), "not a recording of a known format"},
+      {folder.File("other/readme.txt"), "which are EuRoC/ASL folder (a folder with cam0/"},
+      {folder.File("video.mp4"), "cannot be read as a video"},
+      {folder.File("half"), "has no folder cam0/; expected a recording with cam0/ and imu0/"}};
   for (const auto& [path, complaint] : cases) {
     const Result<Recording> recording = ReadRecording(path);
     ASSERT_FALSE(recording);
