@@ -53,7 +53,7 @@ constexpr double kNoiseAlone = 2.0;     // inflation below which the noise is th
 constexpr double kGainSigmas = 2.0;     // beyond its scatter, or the noise of a right effect's gain
 constexpr double kHardlyAnyLoss = 0.1;  // of the gain, lost in the stretches that become worse
 
-// ---- The contest of refitted rivals (contest.cc; docs/diagnosis_simulated.md) ----
+// ---- The contest of refitted rivals (contest.cc; docs/lab/diagnosis_simulated.md) ----
 
 // Rivals with less of the best one's linear gain are not refitted.
 constexpr double kLeastGainOfRival = 0.25;
@@ -80,7 +80,7 @@ constexpr double kGoodPart = 0.3;  // of the misfit that comes and goes, which a
 // ---- Structure without a name (structure.cc) ----
 
 // p of all maps together, as a part of DiagnoseOptions::significance: maps are many, and what they
-// say is no more than that something is left (docs/diagnosis_simulated.md, clean recordings).
+// say is no more than that something is left (docs/lab/diagnosis_simulated.md, clean recordings).
 constexpr double kStructureSignificance = 0.1;
 // Noise changes with what is seen: stretches misfit by up to 3.5 times those that fit well where
 // nothing else is wrong (iphone-cards); wrong by more than the loss is 8.
