@@ -198,13 +198,6 @@ TEST(GyroAxisDelay, FitsReadingsThatAreShiftedAxisByAxis) {
   ASSERT_TRUE(effects);
   calibration.effects = std::make_shared<const EffectSet>(*effects);
   calibration.effect_values = Eigen::Vector2d(0.005, 0.0075);
-  if (test.name == "gyro_g_sensitivity") {  // and that under the mean force
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const AccelSample& sample : simulated->recording.accel) {
-      mean += sample.accel_gyro_m_s2 / static_cast<double>(simulated->recording.accel.size());
-    }
-    calibration.bias_gyro_rad_s += mean.cwiseProduct(calibration.effect_values.head<3>());
-  }
   const double with = Rms(input, calibration);
   EXPECT_LT(with, without / 5.0) << "without " << without << " px, with " << with << " px";
 }
