@@ -8,10 +8,9 @@
 
 namespace camgyro {
 
-// A symmetric positive definite matrix of which few blocks are filled. The blocks of a window are
-// known by name, few and up to 50 wide: a general sparse solver spends most of its time on analysis
-// and on the threads that it starts. Blocks are eliminated in the order of their numbers, without
-// reordering: put first what has the fewest neighbours.
+// A symmetric positive definite matrix of which few blocks are filled: the information of a
+// FactorGraph, whose covariance needs the influence of every factor. Blocks are eliminated in the
+// order of their numbers, without reordering: put first what has the fewest neighbours.
 class BlockCholesky {
  public:
   // Zero matrix with blocks of these sizes.

@@ -1,4 +1,4 @@
-// Parameter blocks and factors under stable names, and the solver for them.
+// Parameter blocks and factors under stable names: a ceres::Problem whose blocks come and go.
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_FACTOR_GRAPH_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_FACTOR_GRAPH_H_
 
@@ -13,9 +13,17 @@
 #include <utility>
 #include <vector>
 
+namespace ceres {
+class Manifold;
+class Problem;
+namespace internal {
+class ResidualBlock;
+}  // namespace internal
+}  // namespace ceres
+
 namespace camgyro {
 
-// What a block is. The solver eliminates from the last kind and index to the first.
+// What a block is. The covariance eliminates from the last kind and index to the first.
 enum class BlockKind {
   kLens,
   kShutter,
@@ -59,11 +67,12 @@ struct Block {
 struct Factor {
   std::shared_ptr<const ceres::CostFunction> cost;
   std::vector<BlockId> blocks;
+  ceres::internal::ResidualBlock* residual_block = nullptr;  // in the problem
 };
 
 struct SolveOptions {
   int max_iterations = 10;
-  // Stops when the next step would lower the cost by less than this fraction of it,
+  // Stops at a step that would lower the cost by less than this fraction of it,
   double function_tolerance = 1e-6;
   // and by less than this: a cost that falls by 0.5 moves an estimate by a sigma, however many
   // factors there are.
@@ -86,24 +95,37 @@ struct Linearization {
   Eigen::VectorXd residuals;
 };
 
+// Keeps one ceres::Problem for its whole life: blocks and factors are added to and removed from it,
+// solves start from the values that are there.
 class FactorGraph {
  public:
   using FactorKey = int64_t;
+
+  FactorGraph();
+  ~FactorGraph();
+  // A copy has values and a problem of its own; cost functions are shared.
+  FactorGraph(const FactorGraph& other);
+  FactorGraph(FactorGraph&& other) noexcept;
+  FactorGraph& operator=(FactorGraph other) noexcept;
 
   // CHECKs that the block is new.
   void AddBlock(const BlockId& id, Block block);
   // CHECKs that the blocks exist and have the sizes that the cost function expects.
   FactorKey AddFactor(std::shared_ptr<const ceres::CostFunction> cost, std::vector<BlockId> blocks);
-  void RemoveFactor(FactorKey key) { factors_.erase(key); }
+  void RemoveFactor(FactorKey key);
 
   bool Has(const BlockId& id) const { return blocks_.count(id) > 0; }
   const Block& block(const BlockId& id) const { return blocks_.at(id); }
-  Eigen::VectorXd& value(const BlockId& id) { return blocks_.at(id).value; }
+  // The problem points at the numbers: they can be set, but neither moved nor resized.
+  Eigen::Map<Eigen::VectorXd> value(const BlockId& id) {
+    Eigen::VectorXd& value = blocks_.at(id).value;
+    return {value.data(), value.size()};
+  }
   const Eigen::VectorXd& value(const BlockId& id) const { return blocks_.at(id).value; }
   const std::map<BlockId, Block>& blocks() const { return blocks_; }
   const std::map<FactorKey, Factor>& factors() const { return factors_; }
 
-  // Levenberg-Marquardt on all factors (normal equations, one thread: repeatable).
+  // Levenberg-Marquardt on all factors (one thread: repeatable).
   SolveReport Solve(const SolveOptions& options);
 
   // Linear functionals of the state with their covariance. Row i of a functional is the sum over
@@ -133,10 +155,14 @@ class FactorGraph {
 
  private:
   std::vector<const Factor*> AllFactors() const;
+  void AddToProblem(const BlockId& id, Block* block);
+  void AddToProblem(Factor* factor);
 
-  std::map<BlockId, Block> blocks_;
+  std::map<BlockId, Block> blocks_;  // nodes: values stay where they are
   std::map<FactorKey, Factor> factors_;
   FactorKey next_key_ = 0;
+  std::map<BlockId, std::shared_ptr<ceres::Manifold>> subsets_;  // of blocks partly constant
+  std::unique_ptr<ceres::Problem> problem_;
 };
 
 }  // namespace camgyro

@@ -1,0 +1,68 @@
+// How Ceres solves a FactorGraph.
+#include <ceres/iteration_callback.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/window/factor_graph.h"
+
+namespace camgyro {
+namespace {
+
+// Stops at the end of a step that lowered the cost by less than the tolerances allow.
+class StopAtCostTolerance final : public ceres::IterationCallback {
+ public:
+  explicit StopAtCostTolerance(const SolveOptions& options) : options_(options) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    const bool settled = summary.iteration > 0 && summary.step_is_successful &&
+                         summary.cost_change <= std::min(options_.function_tolerance * summary.cost,
+                                                         options_.cost_tolerance);
+    return settled ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const SolveOptions options_;
+};
+
+ceres::Solver::Options CeresOptions(const SolveOptions& options) {
+  ceres::Solver::Options ceres_options;
+  ceres_options.logging_type = ceres::SILENT;
+  ceres_options.num_threads = 1;
+  ceres_options.max_num_iterations = options.max_iterations;
+  ceres_options.function_tolerance = options.function_tolerance;
+  ceres_options.gradient_tolerance = 0.0;
+  ceres_options.parameter_tolerance = 0.0;
+  // As fast as any for the window, and near the fastest for the refinement
+  // (docs/lab/performance.md).
+  ceres_options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  return ceres_options;
+}
+
+}  // namespace
+
+SolveReport FactorGraph::Solve(const SolveOptions& options) {
+  ceres::Solver::Options ceres_options = CeresOptions(options);
+  if (std::isfinite(options.cost_tolerance)) {
+    double cost = 0.0;
+    if (problem_->Evaluate({}, &cost, nullptr, nullptr, nullptr) && cost > 0.0) {
+      ceres_options.function_tolerance =
+          std::min(options.function_tolerance, options.cost_tolerance / cost);
+    }
+  }
+  StopAtCostTolerance stop(options);
+  ceres_options.callbacks.push_back(&stop);
+  ceres::Solver::Summary summary;
+  ceres::Solve(ceres_options, problem_.get(), &summary);
+  SolveReport report;
+  report.usable = summary.IsSolutionUsable();
+  report.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
+  report.initial_cost = summary.initial_cost;
+  report.final_cost = summary.final_cost;
+  report.message = summary.message;
+  return report;
+}
+
+}  // namespace camgyro
