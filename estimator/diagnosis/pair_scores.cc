@@ -127,8 +127,8 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   block->chi2 += pair->chi2;
   block->residuals += pair->residuals;
   ++block->pairs;
+  if (s.T.rows() > 0) AddTimes(s, pair, block);
   if (s.bend_column < 0) return;
-  AddTimes(s, pair, block);
 
   // Likelihood of two widths of the bend, all else of the pair projected out: with u the bend's
   // score and W its information, 2 log L(s) = u (W + s^-2)^-1 u - log det(1 + s^2 W).
