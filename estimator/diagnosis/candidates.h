@@ -28,10 +28,8 @@ struct Candidate {
   // Instead of having parameters, it frees what pairs of frames have of their own.
   bool widens_prior() const { return effect->widens_prior(); }
   // Between rivals that gain alike, the smaller one wins: parameters, or more than any effect has
-  // of them for one that frees some in every pair or frame.
-  int complexity() const {
-    return widens_prior() || effect->frees_frame_times() ? 1000 : effect->size();
-  }
+  // of them for one that frees some in every pair.
+  int complexity() const { return widens_prior() ? 1000 : effect->size(); }
 };
 
 // Effects that the model has not, or only in a shape with fewer parameters; without those whose

@@ -7,7 +7,6 @@
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/contest.h"
 #include "estimator/diagnosis/diagnose.h"
-#include "estimator/diagnosis/frame_time_test.h"
 #include "estimator/diagnosis/gain_rule.h"
 #include "estimator/diagnosis/shared_fits.h"
 #include "estimator/diagnosis/step_search.h"
@@ -127,36 +126,6 @@ void AddWidened(const RoundScores& round, std::vector<Contestant>* all) {
     // probability below 1/x under the narrow prior.
     test.p_value = std::exp(-0.5 * test.statistic);
     all->push_back({MakeResult(candidate, test, gain), candidate});
-  }
-}
-
-// Times of the frames' own: a test of their spread, not of a column.
-void AddFrameTimes(const RoundScores& round, const Calibration& model, const Scatter& usual,
-                   std::vector<Contestant>* all) {
-  if (!round.setup.has_pixels || model.pair_effects().frame_time_spread_s() > 0.0) return;
-  for (const EffectEntry& entry : EffectCatalogue()) {
-    for (const std::string& shape : entry.shapes(round.setup)) {
-      const Candidate candidate{&entry, shape, entry.make(round.setup, shape), 0};
-      if (candidate.effect == nullptr || !candidate.effect->frees_frame_times()) continue;
-      const FrameTimeTest test = TestFrameTimes(round.both, usual);
-      ScoreTest result;
-      result.dof = test.dof;
-      result.statistic = test.statistic;
-      result.p_value = test.p_value;
-      result.inflation = test.inflation;
-      result.estimate = Eigen::VectorXd::Constant(1, test.most_likely.spread_s);
-      result.covariance =
-          Eigen::MatrixXd::Constant(1, 1, test.most_likely.sigma_s * test.most_likely.sigma_s);
-      // As of the others: of each share by the other's, halved.
-      const FrameTimeSpread of_fit = TestFrameTimes(round.fit, usual).most_likely;
-      std::vector<double> gain = GainOfSpread(round.choice, of_fit);
-      const std::vector<double> other =
-          GainOfSpread(round.fit, TestFrameTimes(round.choice, usual).most_likely);
-      gain.insert(gain.end(), other.begin(), other.end());
-      for (double& g : gain) g *= 0.5;
-      all->push_back({MakeResult(candidate, result, SumOf(gain)), candidate});
-      all->back().result.start = Eigen::VectorXd::Constant(1, of_fit.spread_s);
-    }
   }
 }
 
@@ -302,9 +271,6 @@ class Loop {
     AddSteps(scores, fits_.shares().block_s, usual, &all);
     if (delay_moves) ReplaceByLargeStep(scores.setup, &all);
     AddWidened(scores, &all);
-    if (in_.graph.residual == ResidualKind::kPlane) {
-      AddFrameTimes(scores, fit_.calibration, usual, &all);
-    }
     JudgeAndSort(options_.significance, &all);
 
     bool added = false;

@@ -80,30 +80,7 @@ struct PairSystem {
   Eigen::VectorXd at;     // where they are
   int bend_column = -1;   // of N, where a candidate frees the bend; -1: none does
   BendVector free_bend;   // 1 / sigma^2 of a bend that is free
-  // By the times of the two frames, where these are from their stamps, and their spread in the
-  // model (0: none; else they are N's last two columns as well).
-  Eigen::Matrix<double, Eigen::Dynamic, 2> T;
-  Eigen::Vector2d offsets_s = Eigen::Vector2d::Zero();
-  double spread_s = 0.0;
 };
-
-// What the pair says of its frames' times, all of N but these projected out.
-void AddTimes(const PairSystem& s, PairScore* pair, BlockScore* block) {
-  const Eigen::Index rest = s.N.cols() - (s.spread_s > 0.0 ? 2 : 0);
-  const auto N = s.N.leftCols(rest);
-  Eigen::MatrixXd A = N.transpose() * N;
-  A.diagonal() += s.prior.head(rest);
-  A.diagonal().array() += 1e-9;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(A);
-  const Eigen::MatrixXd NT = N.transpose() * s.T;
-  const Eigen::VectorXd Nr = N.transpose() * s.r + s.prior.head(rest).cwiseProduct(s.at.head(rest));
-  PairTimes& times = pair->times;
-  times.information = s.T.transpose() * s.T - NT.transpose() * solver.solve(NT);
-  times.score =
-      s.T.transpose() * s.r - NT.transpose() * solver.solve(Nr) - times.information * s.offsets_s;
-  block->log_det += std::log(
-      (Eigen::Matrix2d::Identity() + s.spread_s * s.spread_s * times.information).determinant());
-}
 
 void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore* block) {
   Eigen::MatrixXd A = s.N.transpose() * s.N;
@@ -127,7 +104,6 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   block->chi2 += pair->chi2;
   block->residuals += pair->residuals;
   ++block->pairs;
-  if (s.T.rows() > 0) AddTimes(s, pair, block);
   if (s.bend_column < 0) return;
 
   // Likelihood of two widths of the bend, all else of the pair projected out: with u the bend's
@@ -153,19 +129,20 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
                  const AllEffects& all, double noise, const PairGraphOptions& options,
                  PairSystem* s) {
   PairView view;
-  PairPlane plane;
-  if (!FitPair(input, pair, c, noise, options, &view, &plane)) return false;
+  if (!ViewPair(input, pair, c, noise, options, &view) ||
+      static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches) {
+    return false;
+  }
+  const PairPlane plane = FitPlane(view);
   auto measurement = std::make_shared<PairMeasurement>(view.measurement);
   measurement->effects = all.set->size() > 0 ? all.set : nullptr;
-  measurement->own_times = true;  // beyond the offsets that the view's frames have
   const CoplanarityPlane cost(measurement);
   const ShutterParameters shutter = ShutterOf(c);
   std::vector<const double*> parameters = {c.lens.data(), shutter.data(),
                                            c.q_gyro_cam.coeffs().data(), plane.tau.data(),
                                            plane.bend.data()};
   if (measurement->effects) parameters.push_back(all.values.data());
-  const double here = 0.0;
-  parameters.insert(parameters.end(), {&here, &here, view.rates.data()});
+  parameters.push_back(view.rates.data());
   const Evaluated e = Evaluate(cost, parameters);
   if (e.r.size() == 0) return false;
 
@@ -215,19 +192,6 @@ bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Cali
     s->free_bend = BendSigma(all.free_turn_rad_s, c.readout_s, pair.time_b_s - pair.time_a_s)
                        .cwiseAbs2()
                        .cwiseInverse();
-  }
-  s->T.resize(e.r.size(), 2);
-  s->T << e.J[e.J.size() - 3], e.J[e.J.size() - 2];
-  s->offsets_s << view.measurement.frame_a.offset_s, view.measurement.frame_b.offset_s;
-  s->spread_s = c.pair_effects().frame_time_spread_s();
-  if (s->spread_s > 0.0) {
-    const Eigen::Index own = s->N.cols();
-    s->N.conservativeResize(Eigen::NoChange, own + 2);
-    s->N.rightCols<2>() = s->T;
-    s->prior.conservativeResize(own + 2);
-    s->prior.tail<2>().setConstant(1.0 / (s->spread_s * s->spread_s));
-    s->at.conservativeResize(own + 2);
-    s->at.tail<2>() = s->offsets_s;
   }
   return true;
 }
@@ -294,8 +258,6 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
       }
       PairScore score;
       score.frame_b = pair.frame_b;
-      score.times.frame_a = pair.frame_a;
-      score.times.frame_b = pair.frame_b;
       score.time_s = pair.time_b_s;
       score.block = static_cast<int>(scores.blocks.size());
       // The direction takes two; the bend none, since chi2 has the penalty of its prior.

@@ -11,7 +11,6 @@
 #include "core/calibration.h"
 #include "core/effects/catalogue.h"
 #include "estimator/diagnosis/shares.h"
-#include "estimator/window/frame_times.h"
 #include "estimator/window/pair_graph.h"
 
 namespace camgyro {
@@ -24,9 +23,6 @@ struct BlockScore {
   int pairs = 0;
   int residuals = 0;  // that could vary: without two per pair for its direction
   double chi2 = 0.0;
-  // With frame_stamp_jitter in the model: what integrating the frames' times out adds to chi2, so
-  // that chi2 + log_det is -2 log of a likelihood (PairScore::times).
-  double log_det = 0.0;
   Eigen::VectorXd g;
   Eigen::MatrixXd H;
 };
@@ -40,9 +36,6 @@ struct PairScore {
   int residuals = 0;
   Eigen::VectorXd g;
   Eigen::MatrixXd H;
-  // Of its two frames, of Recording::frames, everything else of the pair projected out. Zero for
-  // attitudes, which say too little of a single frame.
-  PairTimes times;
   // 2 log of the likelihood ratio of latents with the prior that a candidate widens against those
   // with the model's; 0 if none does.
   double latent_gain = 0.0;
