@@ -216,9 +216,9 @@ Result<StartResult> FindStart(const Recording& recording,
   if (!gyro.omega_gyro_rad_s.allFinite()) return BadInput("a gyro rate is not finite");
   auto made = MakeCameraRates(recording, rotations, gyro);
   if (!made) return tl::unexpected<Error>(made.error());
-  CameraRates camera = *std::move(made);
+  const CameraRates camera = *std::move(made);
 
-  double first_s = camera.size() > 0 ? camera.frame_times_s[camera.frame_a.front()] : 0.0;
+  const double first_s = camera.size() > 0 ? camera.frame_times_s[camera.frame_a.front()] : 0.0;
   double last_s = first_s;
   for (const int b : camera.frame_b) last_s = std::max(last_s, camera.frame_times_s[b]);
   const double span_s = last_s - first_s;
@@ -235,22 +235,29 @@ Result<StartResult> FindStart(const Recording& recording,
                              0.5 * recording.camera.readout_s.value_or(0.0) - offset_s;
   const double from_s = guess_lag_s - options.search_s, to_s = guess_lag_s + options.search_s;
 
-  const ClockRate rate = FindClockRate(gyro, camera, from_s, to_s);
-  if (rate.beyond_doubt) {
-    camera = OnGyroClock(std::move(camera), rate.skew);
-    first_s *= 1.0 + rate.skew;
-    last_s *= 1.0 + rate.skew;
-  }
   const double gyro_span_s = gyro.times_s.back();
-  const Streams streams{RateAlignment(std::move(gyro), std::move(camera)),
-                        first_s,
-                        last_s,
-                        gyro_span_s,
-                        offset_s,
-                        guess_lag_s,
-                        noise};
+  const auto streams_at = [&](double skew) {
+    return Streams{RateAlignment(gyro, OnGyroClock(camera, skew)),
+                   first_s * (1.0 + skew),
+                   last_s * (1.0 + skew),
+                   gyro_span_s,
+                   offset_s,
+                   guess_lag_s,
+                   noise};
+  };
+  // A line through delays of stretches that explain nothing, since the delay lies out of reach, is
+  // a line of noise: the clock's rate is believed where the camera follows the gyro with it.
+  ClockRate rate = FindClockRate(gyro, camera, from_s, to_s);
+  if (!rate.beyond_doubt) rate.skew = 0.0;
+  Streams streams = streams_at(rate.skew);
   LagSearch search = SearchLag(streams.alignment, from_s, to_s, options.min_pairs);
   Verdict verdict = Judge(search, noise, offset_s, options);
+  if (rate.beyond_doubt && verdict.outcome != Outcome::kTrusted) {
+    rate = ClockRate();
+    streams = streams_at(0.0);
+    search = SearchLag(streams.alignment, from_s, to_s, options.min_pairs);
+    verdict = Judge(search, noise, offset_s, options);
+  }
   std::string note;
   if (verdict.outcome == Outcome::kNotFound || verdict.outcome == Outcome::kDoesNotFollow) {
     SearchAllAlignments(streams, options, &search, &verdict, &note);
