@@ -15,7 +15,7 @@ namespace camgyro {
 bool RatesOfPair(const EstimationInput& input, const TimedPair& pair,
                  const Calibration& calibration, std::vector<double>* times_s,
                  Eigen::Matrix3Xd* rates, const Eigen::Vector2d& offsets_s) {
-  const auto [from, to] = ExposureSpan({calibration.delay_s, calibration.readout_s},
+  const auto [from, to] = ExposureSpan(ShutterOf(calibration),
                                        Eigen::Vector2d(calibration.width_px, calibration.height_px),
                                        calibration.pair_effects(), pair.first().Moved(offsets_s[0]),
                                        pair.second().Moved(offsets_s[1]));

@@ -37,8 +37,7 @@ CameraPath::CameraPath(const Recording& recording, const Calibration& calibratio
 }
 
 double CameraPath::RowTime(int frame, double row_px) const {
-  return RowTimeGyroS(frame_times_s_[static_cast<size_t>(frame)],
-                      {calibration_.delay_s, calibration_.readout_s}, row_px,
+  return RowTimeGyroS(frame_times_s_[static_cast<size_t>(frame)], ShutterOf(calibration_), row_px,
                       calibration_.height_px);
 }
 
