@@ -73,7 +73,7 @@ class CamgyroTest(unittest.TestCase):
     self.assertAlmostEqual(read.focal_px, c.focal_px, places=5)
     self.assertEqual(read.determined, c.determined)
     path.write_text('camera: {resolution: [640]}')
-    with self.assertRaisesRegex(camgyro.Error, r'calibration.yaml.*resolution'):
+    with self.assertRaisesRegex(camgyro.Error, r'calibration.yaml.*focal_px'):
       camgyro.read_calibration(str(path))
 
   def test_trace_and_curve(self):

@@ -71,7 +71,10 @@ TEST_F(BadInputTest, StampGoesBack) {
     if (index == 20) row[0] = "1";
     return true;
   });
-  ExpectRefusal("a", 3, HasSubstr("a/imu0/data.csv:22"));
+  ExpectRefusal("a --strict", 3, HasSubstr("a/imu0/data.csv:22"));
+  const RunResult mended = Run("calibrate a --out=result");
+  EXPECT_EQ(mended.exit_code, 0) << mended.err;
+  EXPECT_THAT(mended.out, HasSubstr("a/imu0/data.csv:22"));
 }
 
 TEST_F(BadInputTest, ClocksWithoutOverlapAndNoRotation) {

@@ -81,7 +81,9 @@ TEST(Refinement, FramesHaveTimesOfTheirOwn) {
   for (const FrameOffset& frame : refined->frame_times) {
     for (size_t i = 0; i < s.frames.size(); ++i) {
       if (s.recording.frames[i].stamp_ns != input.origin_ns + frame.frame) continue;
-      sum_sq += std::pow((c.delay_s + frame.offset_s - s.frames[i].delay_s) / frame.sigma_s, 2);
+      // The delay, which all frames share, has an error of its own.
+      sum_sq += std::pow(c.delay_s + frame.offset_s - s.frames[i].delay_s, 2) /
+                (std::pow(frame.sigma_s, 2) + c.covariance(kStateDelay, kStateDelay));
       if (frame.sigma_s < 1e-3) ++told;
     }
   }
