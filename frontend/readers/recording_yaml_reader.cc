@@ -37,7 +37,7 @@ class Section {
         yaml_(yaml),
         name_(name),
         is_there_(root[name].IsDefined()),
-        keys_(yaml, root[name].IsMap() ? root[name] : YAML::Node()) {
+        keys_(yaml, is_there_ && root[name].IsMap() ? root[name] : YAML::Node()) {
     if (is_there_ && !root[name].IsMap()) {
       keys_.Fail(name, "expected lines of `key: value` below it");
     }

@@ -228,7 +228,7 @@ const BrokenLog kBroken[] = {
   {"GcsvNoScale", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"gscale,0.5\n", ""}}, {"a.gcsv: has no line gscale,NUMBER before its table"}},
   {"GcsvZeroScale", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"tscale,0.001", "tscale,0"}}, {"a.gcsv:8: tscale: '0' was found, expected a number above zero"}},
   {"GcsvDegrees", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"gscale,0.5", "gscale,50"}}, {"a.gcsv: angular rates reach", "looks like deg/s"}},
-  {"GcsvTimeInSeconds", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"tscale,0.001", "tscale,0.000000001"}}, {"a.gcsv: the median interval of its stamps is 5 ns"}},
+  {"GcsvTimeInSeconds", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"tscale,0.001", "tscale,0.000000001"}}, {"a.gcsv: the mean interval of its stamps is 5 ns"}},
   {"GcsvOrientation", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"orientation,YxZ", "orientation,YyZ"}}, {"a.gcsv:4: orientation: 'YyZ' was found, expected the letters x, y, z"}},
   {"GcsvOrientationLetter", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"orientation,YxZ", "orientation,ABC"}}, {"a.gcsv:4: orientation: 'ABC'"}},
   {"GcsvMagic", kGcsv, "a.mp4", "a.gcsv", "a.gcsv", {{"GYROFLOW", "OTHER"}}, {"a.gcsv:1: 'OTHER IMU LOG' was found, expected GYROFLOW IMU LOG"}},
@@ -259,7 +259,7 @@ const BrokenLog kBroken[] = {
    {"GyroscopeUncalibrated.csv:3: this row has 3 columns, expected 5 (time,seconds_elapsed,z,y,x)"}},
   {"SensorLoggerColumn", kSensorLogger, "Camera/1698501144400.mp4", "", "TotalAcceleration.csv", {{"z,y,x", "z,y"}}, {"TotalAcceleration.csv: the header is time,seconds_elapsed,z,y, expected a column x"}},
   {"SensorLoggerMilliseconds", kSensorLogger, "Camera/1698501144400.mp4", "", "GyroscopeUncalibrated.csv",
-   {{"1698501144401773000", "1698501144401"}, {"1698501144411773000", "1698501144411"}}, {"GyroscopeUncalibrated.csv: the median interval of its stamps is 10 ns"}},
+   {{"1698501144401773000", "1698501144401"}, {"1698501144411773000", "1698501144411"}}, {"GyroscopeUncalibrated.csv: the mean interval of its stamps is 10 ns"}},
   {"SensorLoggerNoCamera", kSensorLogger, "clip.mp4", "", "Gyroscope.csv", {}, {"Camera: has 0 images and 0 videos"}},
 };
 // clang-format on
