@@ -17,7 +17,7 @@ install(TARGETS ${libraries} EXPORT camgyroTargets ARCHIVE DESTINATION ${CMAKE_I
 install(DIRECTORY core factors frontend estimator pipeline
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro
         FILES_MATCHING PATTERN "*.h" PATTERN "readers" EXCLUDE)
-install(FILES frontend/readers/read_recording.h
+install(FILES frontend/readers/read_recording.h frontend/readers/repair_stamps.h
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/camgyro/frontend/readers)
 
 # libcamgyro and its headers, <camgyro/calibrator.h>. An export set of its own: a program that uses
