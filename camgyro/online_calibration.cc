@@ -92,17 +92,13 @@ Status OnlineCalibration::TryStart() {
 
   gap_ = SelectPairs(recording, /*longest_gap=*/10, /*least_pairs=*/10).gap;
 
-  const Prior prior = MakePrior(recording, *start);
-  progress_.prior_sigma = prior.sigma;
-  Calibration from = prior.mean;
-  from.bias_gyro_rad_s = start->bias_gyro_rad_s;
-  if (start->focal && start->focal->determined) from.lens[kFocal] = start->focal->value_px;
-  if (const Status added = AddStartEffects(recording, *start, "", &from); !added) {
-    return tl::unexpected(added.error());
-  }
+  const Result<StartingPoint> point =
+      MakeStartingPoint(recording, *start, /*effects=*/"", ByPlane());
+  if (!point) return tl::unexpected(point.error());
+  progress_.prior_sigma = point->prior.sigma;
   SlidingWindowOptions window_options;
   window_options.graph = GraphOptionsFor(recording, *start, {});
-  window_.emplace(from, prior, gyro_.front().stamp_ns, window_options);
+  window_.emplace(point->estimate, point->prior, gyro_.front().stamp_ns, window_options);
   window_->SetListener([this](const WindowUpdate& update) { Remember(update); });
   history_.clear();
   return {};
@@ -119,6 +115,7 @@ void OnlineCalibration::ProcessWaiting() {
     }
     frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(gap + between));
   }
+  progress_.message = window_->failure().empty() ? "estimating" : window_->failure();
   progress_.pairs_used = used_before_ + static_cast<uint64_t>(window_->num_used_pairs());
   progress_.pairs_skipped =
       skipped_before_ + skipped_here_ + static_cast<uint64_t>(window_->num_skipped_pairs());

@@ -2,11 +2,11 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# Libraries under tools/ are parts of the program.
+# Libraries under tools/ are parts of the program, and the simulator serves it and the tests.
 get_property(all_libraries GLOBAL PROPERTY CAMGYRO_LIBRARIES)
 foreach(library ${all_libraries})
   get_target_property(directory ${library} SOURCE_DIR)
-  if(NOT directory MATCHES "^${PROJECT_SOURCE_DIR}/tools")
+  if(NOT directory MATCHES "^${PROJECT_SOURCE_DIR}/(simulation|tools)(/|$)")
     list(APPEND libraries ${library})
   endif()
 endforeach()

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <memory>
+#include <optional>
 
 #include "core/effects/catalogue.h"
 #include "core/lens.h"
@@ -22,7 +23,10 @@ struct Calibration {
   Eigen::Vector3d bias_gyro_rad_s = Eigen::Vector3d::Zero();
   Eigen::Quaterniond q_gyro_cam = Eigen::Quaterniond::Identity();
 
-  StateCovariance covariance = StateCovariance::Zero();
+  StateCovariance covariance = StateCovariance::Zero();  // of noise
+  // Mean squared error of the values with what effects that nobody has declared may add
+  // (estimator/diagnosis/model_check.h); absent: not known.
+  std::optional<StateCovariance> total_covariance;
   // Parameters that the data informed: sigma well below the prior's.
   std::array<bool, kStateSize> determined{};
 
@@ -40,6 +44,10 @@ struct Calibration {
                                           : PairEffects();
   }
   StateVector sigma() const { return covariance.diagonal().cwiseSqrt(); }
+  std::optional<StateVector> sigma_total() const {
+    if (!total_covariance) return std::nullopt;
+    return StateVector(total_covariance->diagonal().cwiseSqrt());
+  }
 };
 
 // What is believed of a calibration before a recording's frames: a Gaussian around the values of

@@ -1,5 +1,7 @@
 #include "core/recording.h"
 
+#include <utility>
+
 #include "core/robust_statistics.h"
 #include "core/time.h"
 
@@ -38,6 +40,39 @@ std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoin
     pairs.push_back(std::move(pair));
   }
   return pairs;
+}
+
+void LeaveOutFrames(const std::vector<int>& left_out, bool repeats, Recording* recording) {
+  if (left_out.empty()) return;
+  constexpr int kNone = -1;
+  std::vector<int> moved(recording->frames.size());  // new index, or kNone
+  size_t kept = 0, next = 0;
+  for (size_t i = 0; i < moved.size(); ++i) {
+    Frame& frame = recording->frames[i];
+    if (frame.picture < 0) frame.picture = static_cast<int>(i);
+    if (next < left_out.size() && left_out[next] == static_cast<int>(i)) {
+      ++next;
+      moved[i] = repeats ? static_cast<int>(kept) - 1 : kNone;
+      continue;
+    }
+    moved[i] = static_cast<int>(kept);
+    if (kept < i) {
+      recording->frames[kept] = std::move(frame);
+      if (!recording->tracks.empty()) recording->tracks[kept] = std::move(recording->tracks[i]);
+      if (!recording->q_cam_world.empty()) recording->q_cam_world[kept] = recording->q_cam_world[i];
+    }
+    ++kept;
+  }
+  recording->frames.resize(kept);
+  if (!recording->tracks.empty()) recording->tracks.resize(kept);
+  if (!recording->q_cam_world.empty()) recording->q_cam_world.resize(kept);
+  std::vector<FramePair> pairs;
+  for (FramePair& pair : recording->matches) {
+    pair.frame_a = moved[static_cast<size_t>(pair.frame_a)];
+    pair.frame_b = moved[static_cast<size_t>(pair.frame_b)];
+    if (pair.frame_a != kNone && pair.frame_a < pair.frame_b) pairs.push_back(std::move(pair));
+  }
+  recording->matches = std::move(pairs);
 }
 
 double MedianInterval(const std::vector<GyroSample>& gyro) { return MedianIntervalOf(gyro); }

@@ -31,6 +31,8 @@ struct Frame {
   int64_t stamp_ns = 0;                                          // camera clock
   double exposure_s = std::numeric_limits<double>::quiet_NaN();  // NaN: not recorded
   std::string image_file;                                        // path; empty without images
+  // Number of its picture in Recording::video_file, from 0; negative: the frame's own index.
+  int picture = -1;
 };
 
 struct TrackedPoint {
@@ -103,12 +105,15 @@ enum class StampKind {
 
 struct StampReport {
   StampKind kind = StampKind::kMeasured;
-  double period_s = 0.0;    // of the sampling clock, in the mean
-  double jitter_s = 0.0;    // standard deviation of recorded stamps about that clock
-  double latest_s = 0.0;    // the latest stamp's distance from it
-  double residual_s = 0.0;  // how well stretches of the recording agree on the clock
-  int missing = 0;          // samples that the clock has and the stream has not
-  bool repaired = false;    // the samples' stamps are that clock now
+  double period_s = 0.0;       // of the sampling clock, in the mean
+  double jitter_s = 0.0;       // standard deviation of recorded stamps about that clock
+  double latest_s = 0.0;       // the latest stamp's distance from the earliest ones'
+  double residual_s = 0.0;     // how well stretches of the recording agree on the clock
+  double level_sigma_s = 0.0;  // how well its offset from the stamps is known
+  int missing = 0;             // samples that the clock has and the stream has not
+  // The samples' stamps are that clock's now. Of frames: they are to have times of their own in the
+  // fit (frame_stamp_jitter), their stamps stay.
+  bool repaired = false;
 };
 
 // Something wrong with the data as recorded, found and (if `repaired`) mended before any fit.
@@ -131,7 +136,7 @@ struct Recording {
   std::vector<FramePair> matches;                 // pairwise matches without identity
   std::vector<std::vector<TrackedPoint>> tracks;  // one entry per frame, by ascending track id
   std::vector<Eigen::Quaterniond> q_cam_world;    // one per frame, world -> camera
-  std::string video_file;                         // frames of a video or bag, in frames' order
+  std::string video_file;  // of a video or bag; frames have its pictures in their order
 
   MatchNoise match_noise = MatchNoise::kBothImages;
   std::optional<StampReport> gyro_stamps, camera_stamps;  // absent: nobody has looked
@@ -145,6 +150,11 @@ struct Recording {
   bool HasOnlyAttitudes() const {
     return matches.empty() && tracks.empty() && !HasImages() && !q_cam_world.empty();
   }
+  // Number of a frame's picture in video_file.
+  size_t PictureOf(size_t frame) const {
+    const int picture = frames[frame].picture;
+    return picture < 0 ? frame : static_cast<size_t>(picture);
+  }
   bool HasImages() const {
     return !video_file.empty() || (!frames.empty() && !frames.front().image_file.empty());
   }
@@ -153,6 +163,11 @@ struct Recording {
 // Matches between frames i and i + gap from tracks: every track seen in both.
 std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,
                                        int gap);
+
+// Leaves out frames (ascending indices), with their tracks, their attitudes and the pairs that they
+// are in. The others keep their pictures (Frame::picture). With `repeats`, each shows the picture
+// of the frame before it: that one then takes its place in pairs.
+void LeaveOutFrames(const std::vector<int>& left_out, bool repeats, Recording* recording);
 
 // Median interval of strictly increasing stamps [s]; 0 with fewer than two.
 double MedianInterval(const std::vector<GyroSample>& gyro);

@@ -44,7 +44,7 @@ Eigen::Matrix<T, 3, 1> Log(const Eigen::Quaternion<T>& q) {
   using std::sqrt;
   const Eigen::Matrix<T, 3, 1> imag = q.vec();
   const T sin_sq = imag.squaredNorm();
-  const T w = q.w();
+  const T& w = q.w();
   if (sin_sq < T(1e-12)) {
     // angle / sin(angle/2) -> (2/w)(1 - sin_sq/(3 w^2)), valid for both signs of w.
     const T scale = T(2) / w * (T(1) - sin_sq / (T(3) * w * w));

@@ -1,15 +1,14 @@
 #include "estimator/calibrate.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <future>
+#include <limits>
+#include <utility>
 
 #include "core/format.h"
-#include "core/so3.h"
-#include "core/usual_focal.h"
+#include "estimator/halves.h"
 
 namespace camgyro {
 namespace {
@@ -56,66 +55,6 @@ Result<StartResult> StartFromPictures(const Recording& recording,
     best->notes.push_back("no focal length could be found for the start: a usual one is used");
   }
   return best;
-}
-
-// How the two halves of a recording disagree, in view of their covariances: chi-square per
-// parameter of the difference. 1 for a right model; what a constant model leaves out, and moves,
-// shows here.
-double HalvesChi2(const Calibration& first, const Calibration& second) {
-  const StateVector d = Difference(first, second);
-  const StateCovariance sum = first.covariance + second.covariance;
-  // Unit diagonal before the factorisation: the units differ by orders of magnitude.
-  const StateVector scale = sum.diagonal().cwiseSqrt().cwiseInverse();
-  const StateCovariance correlation = scale.asDiagonal() * sum * scale.asDiagonal();
-  const StateVector z = scale.cwiseProduct(d);
-  return z.dot(correlation.ldlt().solve(z)) / kStateSize;
-}
-
-// The disagreement that right models exceed once in a thousand recordings: the 99.9 % quantile of
-// chi-square with 11 degrees of freedom is 31.3.
-constexpr double kHalvesLimit = 31.3 / kStateSize;
-
-struct Halves {
-  double chi2 = 0.0;  // HalvesChi2, 0 if a half cannot be fitted
-  std::optional<UnseenFit> unseen;
-};
-
-// Each half of the pairs is fitted alone, and the other one tells how well. The pairs across the
-// middle belong to neither, so that no frame is in both.
-Halves FitHalves(const EstimationInput& input, const Calibration& from, const Prior& prior,
-                 const RefinementOptions& refinement) {
-  const auto middle = input.pairs.begin() + static_cast<std::ptrdiff_t>(input.pairs.size() / 2);
-  std::array<std::vector<TimedPair>, 2> halves;
-  halves[0].assign(input.pairs.begin(), middle);
-  for (auto pair = middle; pair != input.pairs.end(); ++pair) {
-    if (pair->time_a_s > halves[0].back().time_b_s) halves[1].push_back(*pair);
-  }
-  RefinementOptions options = refinement;
-  options.max_rounds = std::min(4, refinement.max_rounds);
-  options.cluster_s = 0.5 * refinement.cluster_s;
-  std::array<Calibration, 2> fits;
-  UnseenFit unseen;
-  bool both = true;
-  for (size_t h = 0; h < 2; ++h) {
-    const Result<Refined> half = Refine(input, halves[h], from, prior, options);
-    if (!half) {
-      both = false;
-      continue;
-    }
-    fits[h] = half->calibration;
-    if (halves[1 - h].empty() || halves[1 - h].front().matches.empty()) continue;  // attitudes
-    const UnseenFit other = EvaluateUnseen(input, halves[1 - h], half->calibration,
-                                           half->quality.noise_px, refinement.graph);
-    unseen.rms_px = std::sqrt((unseen.matches * unseen.rms_px * unseen.rms_px +
-                               other.matches * other.rms_px * other.rms_px) /
-                              std::max(1, unseen.matches + other.matches));
-    unseen.matches += other.matches;
-    unseen.pairs += other.pairs;
-  }
-  Halves result;
-  if (unseen.matches > 0) result.unseen = unseen;
-  if (both) result.chi2 = HalvesChi2(fits[0], fits[1]);
-  return result;
 }
 
 // A parameter is determined if the data shrank its prior and the result is of practical use.
@@ -180,74 +119,9 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
 
 }  // namespace
 
-Prior MakePrior(const Recording& recording, const StartResult& start) {
-  const CameraGuess& guess = recording.camera;
-  Prior result;
-  Calibration& prior = result.mean;
-  prior.width_px = guess.width_px;
-  prior.height_px = guess.height_px;
-  prior.distortion_model = guess.distortion_model;
-  const Eigen::Vector2d centre(0.5 * (guess.width_px - 1), 0.5 * (guess.height_px - 1));
-  const bool scanned = start.focal && start.focal->determined;
-  const double focal = scanned && !guess.focal_px ? start.focal->value_px : FocalToBeginWith(guess);
-  prior.lens = MakePinhole(focal, guess.principal_px.value_or(centre), guess.aspect_ratio);
-  for (size_t i = 0; i < guess.distortion.size() && i < 4; ++i) {
-    prior.lens[FirstCoefficient(guess.distortion_model) + static_cast<int>(i)] =
-        guess.distortion[i];
-  }
-  const double interval = std::min(1.0 / 30.0, MedianInterval(recording.frames));
-  prior.readout_s = guess.readout_s.value_or(0.5 * interval);
-  prior.delay_s = start.delay_middle_row_s - 0.5 * prior.readout_s;
-  prior.q_gyro_cam = start.q_gyro_cam;
-
-  const StateScales scales{focal, static_cast<double>(guess.width_px),
-                           std::hypot(guess.width_px, guess.height_px), interval};
-  std::array<bool, kStateSize> declared{};
-  declared[kStateFocal] = guess.focal_px.has_value();
-  declared[kStateReadout] = guess.readout_s.has_value();
-  StateVector& sigma = result.sigma;
-  for (size_t i = 0; i < kStateSize; ++i) {
-    const StateParameter& parameter = StateTable()[i];
-    sigma[static_cast<Eigen::Index>(i)] =
-        (declared[i] ? parameter.declared_sigma : parameter.usual_sigma).In(scales);
-  }
-  if (recording.HasOnlyAttitudes()) {
-    // An attitude has neither pixels nor rows: nothing depends on the lens, and the readout is 0.
-    prior.readout_s = 0.0;
-    prior.delay_s = start.delay_middle_row_s;
-    for (size_t i = 0; i < kStateSize; ++i) {
-      if (StateTable()[i].needs_pixels) sigma[static_cast<Eigen::Index>(i)] = 1.0;
-    }
-  }
-  auto rotation = sigma.segment<3>(kStateRotation);
-  rotation = start.rotation_sigma_rad.cwiseMax(rotation);
-  return result;
-}
-
-Status AddStartEffects(const Recording& recording, const StartResult& start,
-                       const std::string& list, Calibration* calibration) {
-  EffectSetup setup = MakeEffectSetup(recording, *calibration);
-  setup.clock_skew = start.clock_skew;
-  Result<EffectSet> effects = MakeEffects(list, setup);
-  if (!effects) return tl::unexpected(effects.error());
-  for (const EffectEntry& entry : EffectCatalogue()) {
-    if (!entry.found_at_start || effects->Has(entry.name) || !entry.found_at_start(setup)) continue;
-    const std::string shape = entry.shapes(setup).back();
-    effects->Add(&entry, shape, entry.make(setup, shape));
-  }
-  if (effects->items().empty()) return {};
-  calibration->effect_values = Eigen::VectorXd::Zero(effects->size());
-  for (const EffectSet::Item& item : effects->items()) {
-    item.effect->SetStart(calibration->effect_values.data() + item.first);
-  }
-  calibration->effects = std::make_shared<const EffectSet>(std::move(*effects));
-  return {};
-}
-
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
                                  const CalibrateOptions& options) {
   PairGraphOptions graph_options = options.window.graph;
-  graph_options.residual = options.residual;
   graph_options.match_noise = recording.match_noise;
   graph_options.gyro_sigma_rad_s = GyroSigma(recording, start.delay_middle_row_s);
   if (recording.gyro_info.random_walk_rad_s2_rtHz) {
@@ -257,171 +131,248 @@ PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& 
   return graph_options;
 }
 
-Result<CalibrationReport> CalibrateRecording(const Recording& recording,
-                                             const CameraRotationsAtFocal& rotations_at,
-                                             const CalibrateOptions& options,
-                                             const Progress& progress) {
-  const auto tell = [&](const std::string& stage, double done) {
-    if (progress) progress(stage, done);
-  };
-  CalibrationReport report;
-  report.residual = options.residual;
-  StageClock clock(&report.times);
-  const bool attitudes = recording.HasOnlyAttitudes();
-  const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
+namespace {
 
-  tell("start", 0.0);
-  const Result<StartResult> start =
-      options.given_start ? Result<StartResult>(*options.given_start)
-      : attitudes         ? FindStart(recording, NeighbourRotations(recording), options.start)
-                          : StartFromPictures(recording, rotations_at, options);
-  if (!start) return tl::unexpected(start.error());
-  report.start = *start;
-  for (const std::string& note : start->notes) report.notes.push_back("at the start: " + note);
-  clock.Finish("start");
-
-  const Prior prior = MakePrior(recording, *start);
-  report.prior = prior;
-  Calibration estimate = prior.mean;
-  estimate.bias_gyro_rad_s = start->bias_gyro_rad_s;
-  if (start->focal && start->focal->determined) estimate.lens[kFocal] = start->focal->value_px;
-  if (options.from) {
-    estimate = *options.from;
-  } else if (const Status added = AddStartEffects(recording, *start, options.effects, &estimate);
-             !added) {
-    return tl::unexpected(added.error());
+// The stages of CalibrateRecording, one after the other.
+class CalibrationJob {
+ public:
+  CalibrationJob(const Recording& recording, const CalibrateOptions& options,
+                 const Progress& progress)
+      : recording_(recording),
+        options_(options),
+        progress_(progress),
+        attitudes_(recording.HasOnlyAttitudes()),
+        input_(MakeEstimationInput(recording, SelectPairs(recording))),
+        clock_(&report_.times) {
+    report_.residual = options.window.graph.residual;
   }
-  if (estimate.effects && estimate.effects->frame_time_spread() >= 0 &&
-      options.residual != ResidualKind::kPlane) {
-    return BadUsage("--effects: frames have times of their own with --residual=plane only");
-  }
-  const PairGraphOptions graph_options = GraphOptionsFor(recording, *start, options);
-  const Calibration from_start = estimate;
 
-  if (!attitudes && options.online) {
-    SlidingWindowOptions window_options = options.window;
-    window_options.graph = graph_options;
-    SlidingWindow window(estimate, prior, input.origin_ns, window_options);
-    window.SetListener([&](const WindowUpdate& update) { report.trace.push_back(update); });
-    // In the order of real time: a sample is known when its time has come, a frame at its stamp.
+  Result<CalibrationReport> Run(const CameraRotationsAtFocal& rotations_at) {
+    if (const Status found = Start(rotations_at); !found) return tl::unexpected(found.error());
+    if (!attitudes_ && options_.online) {
+      if (const Status done = Window(); !done) return tl::unexpected(done.error());
+    }
+    if (options_.refine || !report_.online) {
+      if (const Status done = Refinement(); !done) return tl::unexpected(done.error());
+    } else {
+      report_.calibration = estimate_;
+      report_.quality.pairs = report_.pairs_used_online;
+      report_.quality.noise_px = report_.trace.back().noise_px;
+      report_.converged = true;
+    }
+    if (recording_.gyro_stamps && recording_.gyro_stamps->repaired) {
+      // The delay is that of the gyro's clock, whose offset from its stamps is an estimate, too.
+      report_.calibration.covariance(kStateDelay, kStateDelay) +=
+          std::pow(recording_.gyro_stamps->level_sigma_s, 2);
+    }
+    MarkDetermined(attitudes_, report_.prior, &report_.calibration);
+    if (!report_.converged) {  // delay and bias come from rates; the rest needs the fit
+      for (size_t i = 0; i < kStateSize; ++i) {
+        if (StateTable()[i].needs_fit) report_.calibration.determined[i] = false;
+      }
+    }
+    AddDoubts(recording_, &report_);
+    Tell("refinement", 1.0);
+    return std::move(report_);
+  }
+
+ private:
+  void Tell(const std::string& stage, double done) const {
+    if (progress_) progress_(stage, done);
+  }
+
+  Status Start(const CameraRotationsAtFocal& rotations_at) {
+    Tell("start", 0.0);
+    const Result<StartResult> start =
+        options_.given_start ? Result<StartResult>(*options_.given_start)
+        : attitudes_         ? FindStart(recording_, NeighbourRotations(recording_), options_.start)
+                             : StartFromPictures(recording_, rotations_at, options_);
+    if (!start) return tl::unexpected(start.error());
+    report_.start = *start;
+    for (const std::string& note : start->notes) report_.notes.push_back("at the start: " + note);
+    clock_.Finish("start");
+
+    if (options_.from) {
+      report_.prior = MakePrior(recording_, *start);
+      estimate_ = *options_.from;
+    } else {
+      Result<StartingPoint> point =
+          MakeStartingPoint(recording_, *start, options_.effects, *report_.residual);
+      if (!point) return tl::unexpected(point.error());
+      report_.prior = std::move(point->prior);
+      estimate_ = std::move(point->estimate);
+    }
+    from_start_ = estimate_;
+    graph_options_ = GraphOptionsFor(recording_, *start, options_);
+    return CheckEffects();
+  }
+
+  // Can what is to be fitted be fitted?
+  Status CheckEffects() const {
+    const EffectSet* const effects = estimate_.effects.get();
+    const PairResidual::Facts& chosen = report_.residual->facts();
+    if (effects == nullptr || effects->size() == 0) return {};
+    if (!attitudes_ && !chosen.with_effects) {
+      return BadUsage(
+          std::string("--residual=") + chosen.name + " knows no effects, but " +
+          effects->items().front().entry->name +
+          " is in this recording, or asked for: use --residual=" + ByPlane().facts().name);
+    }
+    if (effects->frame_time_spread() >= 0 && !chosen.with_frame_times) {
+      return BadUsage("--effects: frames have times of their own with --residual=plane only");
+    }
+    return {};
+  }
+
+  // The online pass, in the order of real time: a sample is known when its time has come, a frame
+  // at its stamp.
+  Status Window() {
+    SlidingWindowOptions window_options = options_.window;
+    window_options.graph = graph_options_;
+    SlidingWindow window(estimate_, report_.prior, input_.origin_ns, window_options);
+    window.SetListener([&](const WindowUpdate& update) { report_.trace.push_back(update); });
     size_t next_sample = 0;
-    const std::vector<TimedPair> pairs = SideBySide(input.pairs);
+    const std::vector<TimedPair> pairs = SideBySide(input_.pairs);
     for (size_t i = 0; i < pairs.size(); ++i) {
       const TimedPair& pair = pairs[i];
-      const double known_s = pair.time_b_s + DelayOf(estimate, pair.second());
-      for (; next_sample < input.rates.size() && input.rates[next_sample].time_s <= known_s;
-           ++next_sample) {
-        if (window.AddGyroSample(recording.gyro[next_sample], input.rates[next_sample].saturated) !=
-            AddResult::kAccepted) {
-          return BadInput("gyro sample " + std::to_string(next_sample) +
-                          ": the stamp repeats or goes back, or a rate is not finite");
-        }
-      }
-      if (window.AddPair(recording.frames[static_cast<size_t>(pair.frame_a)].stamp_ns,
-                         recording.frames[static_cast<size_t>(pair.frame_b)].stamp_ns, pair.matches,
-                         pair.exposure_a_s, pair.exposure_b_s) != AddResult::kAccepted) {
+      const double known_s = pair.time_b_s + DelayOf(estimate_, pair.second());
+      if (const Status fed = FeedGyro(known_s, &next_sample, &window); !fed) return fed;
+      if (window.AddPair(recording_.frames[static_cast<size_t>(pair.frame_a)].stamp_ns,
+                         recording_.frames[static_cast<size_t>(pair.frame_b)].stamp_ns,
+                         pair.matches, pair.exposure_a_s,
+                         pair.exposure_b_s) != AddResult::kAccepted) {
         return BadInput("frames " + std::to_string(pair.frame_a) + " and " +
                         std::to_string(pair.frame_b) +
                         ": the stamp repeats or goes back, or a pixel is not finite");
       }
-      if (i % 20 == 0) tell("window", static_cast<double>(i) / static_cast<double>(pairs.size()));
+      if (i % 20 == 0) Tell("window", static_cast<double>(i) / static_cast<double>(pairs.size()));
     }
-    for (; next_sample < input.rates.size(); ++next_sample) {
-      if (window.AddGyroSample(recording.gyro[next_sample], input.rates[next_sample].saturated) !=
+    if (const Status fed = FeedGyro(std::numeric_limits<double>::infinity(), &next_sample, &window);
+        !fed) {
+      return fed;
+    }
+    report_.pairs_used_online = window.num_used_pairs();
+    report_.skipped_pairs = window.num_skipped_pairs();
+    if (!window.failure().empty()) {
+      report_.notes.push_back("the online pass ended without a result: " + window.failure());
+    }
+    if (!report_.trace.empty()) {
+      estimate_ = window.latest().estimate;
+      report_.online = estimate_;
+      MarkDetermined(attitudes_, report_.prior, &*report_.online);
+    }
+    clock_.Finish("window");
+    return {};
+  }
+
+  // The samples up to a time.
+  Status FeedGyro(double until_s, size_t* next, SlidingWindow* window) const {
+    for (; *next < input_.rates.size() && input_.rates[*next].time_s <= until_s; ++*next) {
+      if (window->AddGyroSample(recording_.gyro[*next], input_.rates[*next].saturated) !=
           AddResult::kAccepted) {
-        return BadInput("gyro sample " + std::to_string(next_sample) +
+        return BadInput("gyro sample " + std::to_string(*next) +
                         ": the stamp repeats or goes back, or a rate is not finite");
       }
     }
-    report.pairs_used_online = window.num_used_pairs();
-    report.skipped_pairs = window.num_skipped_pairs();
-    if (!report.trace.empty()) {
-      estimate = window.latest().estimate;
-      report.online = estimate;
-      MarkDetermined(attitudes, prior, &*report.online);
-    }
-    clock.Finish("window");
+    return {};
   }
 
-  if (options.refine || !report.online) {
-    RefinementOptions refinement = options.refinement;
-    refinement.graph = graph_options;
-    if (!report.trace.empty()) refinement.graph.sigma_px = report.trace.back().noise_px;
-    Calibration from = estimate;
-    const double duration = input.pairs.back().time_b_s - input.pairs.front().time_a_s;
+  RefinementOptions OptionsOfRefinement() const {
+    RefinementOptions refinement = options_.refinement;
+    refinement.graph = graph_options_;
+    if (!report_.trace.empty()) refinement.graph.sigma = report_.trace.back().noise_px;
+    const double duration = input_.pairs.back().time_b_s - input_.pairs.front().time_a_s;
     refinement.cluster_s = std::clamp(duration / 12.0, 0.2, refinement.cluster_s);
-    tell("refinement", 0.0);
-    const auto refine = [&](const Calibration& again_from, double noise) {
-      RefinementOptions again = refinement;
-      (attitudes ? again.sigma_rad : again.graph.sigma_px) = noise;
-      return Refine(input, input.pairs, again_from, prior, again);
-    };
+    return refinement;
+  }
+
+  Result<Refined> RefineWith(RefinementOptions options, const Calibration& from,
+                             std::optional<double> noise) const {
+    options.graph.sigma = noise;
+    return Refine(input_, input_.pairs, from, report_.prior, options);
+  }
+
+  // Beside the fit of all pairs, each half alone. The arguments have to outlive what is returned.
+  std::future<Halves> BeginHalves(const Calibration& from, const RefinementOptions& options) const {
+    if (static_cast<int>(input_.pairs.size()) < kMinPairsForUnseen) return {};
+    return std::async(std::launch::async, FitHalves, std::cref(input_), std::cref(from),
+                      std::cref(report_.prior), std::cref(options));
+  }
+
+  Status Refinement() {
+    Tell("refinement", 0.0);
+    const RefinementOptions refinement = OptionsOfRefinement();
+    Calibration from = estimate_;
     if (from.effects != nullptr &&
         std::any_of(from.effects->items().begin(), from.effects->items().end(),
                     [](const auto& item) { return item.effect->depends_on_calibration(); })) {
-      const Result<Refined> first = Refine(input, input.pairs, from, prior, refinement);
+      const Result<Refined> first = RefineWith(refinement, from, refinement.graph.sigma);
       if (!first) return tl::unexpected(first.error());
-      from = SettleEffects(recording, *first, refine).calibration;
+      from = SettleEffects(recording_, *first, [&](const Calibration& start, double noise) {
+               return RefineWith(refinement, start, noise);
+             }).calibration;
     }
     RefinementOptions dropping = refinement;
     dropping.graph.drop_without_ray = true;
-    // Beside the fit of all pairs, each half alone.
-    std::future<Halves> halves_fit;
-    const auto begin_halves = [&](const RefinementOptions& with) {
-      if (static_cast<int>(input.pairs.size()) < kMinPairsForUnseen) return;
-      halves_fit = std::async(std::launch::async, FitHalves, std::cref(input), std::cref(from),
-                              std::cref(prior), std::cref(with));
-    };
-    begin_halves(refinement);
-    Result<Refined> refined = Refine(input, input.pairs, from, prior, refinement);
-    if (!refined && report.online) {  // a window that has run away, to a lens without rays
-      refined = refine(from_start, options.refinement.graph.sigma_px);
-      report.notes.push_back("the online estimate leads nowhere; all frames fitted from the start");
+    std::future<Halves> halves_fit = BeginHalves(from, refinement);
+    Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
+    if (!refined && report_.online) {  // a window that has run away, to a lens without rays
+      refined = RefineWith(refinement, from_start_, std::nullopt);
+      report_.notes.push_back(
+          "the online estimate leads nowhere; all frames fitted from the start");
     }
     if (!refined && from.effects != nullptr) {
-      refined = Refine(input, input.pairs, from, prior, dropping);
-      begin_halves(dropping);
+      refined = RefineWith(dropping, from, dropping.graph.sigma);
+      halves_fit = BeginHalves(from, dropping);
       if (refined) {
-        report.notes.push_back(
+        report_.notes.push_back(
             "matches where the lens of the start has no ray, at the edge of the picture, are left "
             "out");
       }
     }
     if (!refined) return tl::unexpected(refined.error());
-    report.calibration = refined->calibration;
-    report.quality = refined->quality;
-    report.skipped_pairs = refined->skipped_pairs;
-    report.frame_times = refined->frame_times;
-    report.converged = refined->converged;
-    tell("refinement", 0.6);
-    const Halves halves = halves_fit.valid() ? halves_fit.get() : Halves();
-    report.unseen = halves.unseen;
-    report.halves_chi2 = halves.chi2;
-    if (halves.chi2 > kHalvesLimit) {
-      report.calibration.covariance *= halves.chi2;
-      report.calibration.effect_covariance *= halves.chi2;
-      report.doubts.push_back(Format(
-          "the two halves of the recording disagree beyond their noise (chi2 per parameter %.0f "
-          "instead of 1): something moves that the model holds constant, or the scene is "
-          "degenerate; all sigmas are multiplied by %.1f",
-          halves.chi2, std::sqrt(halves.chi2)));
-    }
-    clock.Finish("refinement");
-  } else {
-    report.calibration = estimate;
-    report.quality.pairs = report.pairs_used_online;
-    report.quality.noise_px = report.trace.back().noise_px;
-    report.converged = true;
+    report_.calibration = refined->calibration;
+    report_.quality = refined->quality;
+    report_.skipped_pairs = refined->skipped_pairs;
+    report_.frame_times = refined->frame_times;
+    report_.converged = refined->converged;
+    Tell("refinement", 0.6);
+    TakeHalves(halves_fit.valid() ? halves_fit.get() : Halves());
+    clock_.Finish("refinement");
+    return {};
   }
-  MarkDetermined(attitudes, prior, &report.calibration);
-  if (!report.converged) {  // delay and bias come from rates; the rest needs the fit
-    for (size_t i = 0; i < kStateSize; ++i) {
-      if (StateTable()[i].needs_fit) report.calibration.determined[i] = false;
-    }
+
+  void TakeHalves(const Halves& halves) {
+    report_.unseen = halves.unseen;
+    report_.halves_chi2 = halves.chi2;
+    if (!(halves.chi2 > kHalvesLimit)) return;
+    report_.calibration.covariance *= halves.chi2;
+    report_.calibration.effect_covariance *= halves.chi2;
+    report_.doubts.push_back(
+        Format("the two halves of the recording disagree beyond their noise (chi2 per parameter "
+               "%.0f instead of 1): something moves that the model holds constant, or the scene is "
+               "degenerate; all sigmas are multiplied by %.1f",
+               halves.chi2, std::sqrt(halves.chi2)));
   }
-  AddDoubts(recording, &report);
-  tell("refinement", 1.0);
-  return report;
+
+  const Recording& recording_;
+  const CalibrateOptions& options_;
+  const Progress& progress_;
+  const bool attitudes_;
+  const EstimationInput input_;
+  CalibrationReport report_;
+  StageClock clock_;
+  Calibration estimate_, from_start_;
+  PairGraphOptions graph_options_;
+};
+
+}  // namespace
+
+Result<CalibrationReport> CalibrateRecording(const Recording& recording,
+                                             const CameraRotationsAtFocal& rotations_at,
+                                             const CalibrateOptions& options,
+                                             const Progress& progress) {
+  return CalibrationJob(recording, options, progress).Run(rotations_at);
 }
 
 }  // namespace camgyro

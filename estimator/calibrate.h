@@ -12,6 +12,7 @@
 #include "core/result.h"
 #include "estimator/start/find_start.h"
 #include "estimator/start/focal_scan.h"
+#include "estimator/starting_point.h"
 #include "estimator/window/refinement.h"
 #include "estimator/window/sliding_window.h"
 
@@ -21,7 +22,6 @@ namespace camgyro {
 using Progress = std::function<void(const std::string& stage, double done)>;
 
 struct CalibrateOptions {
-  ResidualKind residual = ResidualKind::kPlane;
   bool refine = true;   // false: the online estimate is the result
   std::string effects;  // of the catalogue, to fit as well, not with transfers; see MakeEffects
   StartOptions start;
@@ -31,13 +31,19 @@ struct CalibrateOptions {
   std::optional<Calibration> from;
   bool online = true;  // false: no sliding window, the refinement alone
   FocalScanOptions focal_scan;
-  SlidingWindowOptions window;
+  SlidingWindowOptions window;  // its graph is that of the refinement, too
   RefinementOptions refinement;
 };
 
 struct StageTime {
   std::string stage;
   double seconds = 0.0;
+};
+
+// What an effect that nobody has declared may add to the error of each parameter.
+struct EffectShare {
+  std::string effect;
+  StateVector sigma = StateVector::Zero();
 };
 
 struct CalibrationReport {
@@ -48,7 +54,7 @@ struct CalibrationReport {
   std::vector<WindowUpdate> trace;  // one per solved window
   int pairs_used_online = 0;
 
-  ResidualKind residual = ResidualKind::kPlane;  // that was fitted
+  const PairResidual* residual = &ByPlane();  // that was chosen for matches
   StartResult start;
   FitQuality quality;
   // Each half of the recording under the fit of the other half. The result itself uses all frames.
@@ -61,6 +67,9 @@ struct CalibrationReport {
   // With frame_stamp_jitter: the frames' own times, by nanoseconds after the first gyro stamp.
   std::vector<FrameOffset> frame_times;
   bool converged = false;
+  // Where calibration.total_covariance comes from (estimator/diagnosis/model_check.h).
+  std::string device_class;
+  std::vector<EffectShare> systematic;
 
   std::vector<std::string> notes;   // what a user should know
   std::vector<std::string> doubts;  // reasons not to believe a number
@@ -75,19 +84,6 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                                              const CameraRotationsAtFocal& rotations_at,
                                              const CalibrateOptions& options,
                                              const Progress& progress = nullptr);
-
-// The Gaussian prior of a calibration, as wide as the table of the state says (core/state.h).
-//   f: the declared one, else the scan's; c: the declared one, else the centre; t_r: declared, else
-//   half of the shorter of frame interval and 1/30 s; t_d: the search's; b_g: 0; q_c: the search's,
-//   with its sigma where that is wider than the table's. Attitudes: t_r 0, and units for what needs
-//   pixels.
-Prior MakePrior(const Recording& recording, const StartResult& start);
-
-// Puts effects into a calibration that has none: those of a list (MakeEffects), and those that the
-// start has found (EffectEntry::found_at_start), with the values where a fit begins. Errors: the
-// list's.
-Status AddStartEffects(const Recording& recording, const StartResult& start,
-                       const std::string& list, Calibration* calibration);
 
 // Noise and loss as CalibrateRecording uses them for this recording.
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,

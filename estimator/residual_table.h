@@ -7,27 +7,18 @@
 
 #include "core/calibration.h"
 #include "estimator/window/estimation_input.h"
-#include "estimator/window/pair_graph.h"
+#include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
 
 // One match under a calibration.
-struct MatchResidual {
+struct MatchResidual : MatchMisfit {
   int frame_a = 0, frame_b = 0;  // indices into Recording::frames
   Match match;
   // At which px_b was exposed, gyro clock from EstimationInput::origin_ns; effects of the clock are
   // left out.
   double time_s = 0.0;
   double rate_rad_s = 0.0;  // of the camera at that time, bias removed
-  // Signed distance from the plane of the pair (Sampson), of one noisy coordinate [px]. The sign
-  // follows the sign of the pair's direction and has no meaning across pairs. Of a transfer: the
-  // length of its error, times what gives it the median of one coordinate's magnitude.
-  double residual_px = 0.0;
-  // The shortest shift of px_b that takes the match onto the plane, if all of the error is there;
-  // it lies across the epipolar line. Signed, and comparable across pairs [px]. Of a transfer: the
-  // shift of px_b to where the rotation puts px_a.
-  Eigen::Vector2d correction_px = Eigen::Vector2d::Zero();
-  bool inlier = false;  // within PairGraphOptions::inlier_sigmas
 };
 
 // Residuals of all matches of the pairs that the gyro covers. Rates are the gyro's own, less the

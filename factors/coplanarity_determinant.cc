@@ -12,7 +12,7 @@ namespace camgyro {
 CoplanarityDeterminant::CoplanarityDeterminant(std::shared_ptr<const PairMeasurement> pair,
                                                std::vector<Triplet> triplets)
     : pair_(std::move(pair)), triplets_(std::move(triplets)) {
-  CHECK_GT(pair_->sigma_px, 0.0);
+  CHECK_GT(pair_->sigma, 0.0);
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   set_num_residuals(static_cast<int>(triplets_.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4};

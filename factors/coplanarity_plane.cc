@@ -36,7 +36,7 @@ PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matri
 
 CoplanarityPlane::CoplanarityPlane(std::shared_ptr<const PairMeasurement> pair)
     : pair_(std::move(pair)) {
-  CHECK_GT(pair_->sigma_px, 0.0);
+  CHECK_GT(pair_->sigma, 0.0);
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   set_num_residuals(static_cast<int>(pair_->matches.size()));
   *mutable_parameter_block_sizes() = {kLensSize, kShutterSize, 4, 3, 6};

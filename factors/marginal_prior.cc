@@ -33,7 +33,7 @@ bool MarginalPrior::Evaluate(double const* const* parameters, double* residuals,
     const Block& block = blocks_[k];
     const int size = block.tangent_size();
     if (block.is_rotation) {
-      const Eigen::Quaterniond q(Eigen::Map<const Eigen::Quaterniond>(parameters[k]));
+      const Eigen::Quaterniond q{Eigen::Map<const Eigen::Quaterniond>(parameters[k])};
       const Eigen::Quaterniond q_lin(
           Eigen::Map<const Eigen::Quaterniond>(block.linearization.data()));
       delta.segment<3>(column) = Log(Eigen::Quaterniond(q_lin.conjugate() * q.normalized()));

@@ -12,20 +12,27 @@
 
 namespace camgyro {
 
-// One pair of frames as the coplanarity factors see it. Times in seconds from the window's origin.
+// One pair of frames as its factor sees it: matches, or the rotation between two camera attitudes.
+// Times in seconds from the window's origin.
 struct PairMeasurement {
   std::vector<Match> matches;
+  // Of attitudes (RelativeRotation): vectors of camera b into camera a, and the row that it refers
+  // to, of the height.
+  Eigen::Quaterniond q_a_b = Eigen::Quaterniond::Identity();
+  double row_fraction = 0.0;
   FrameTime frame_a, frame_b;
   Eigen::Vector2d size_px = Eigen::Vector2d::Zero();
-  double sigma_px = 1.0;  // > 0, per axis of a noisy observation
+  // > 0, per axis of a noisy observation [px], or of the rotation between attitudes [rad].
+  double sigma = 1.0;
   MatchNoise noise = MatchNoise::kBothImages;
-  double robust_threshold = 0.0;  // in sigmas; 0: no loss
+  double robust_threshold = 0.0;  // in sigmas (of a rotation: of each axis); 0: no loss
   double readout_over_gap = 0.0;  // t_r over the time between the frames, of CoplanarityPlane
   const Lens* lens = nullptr;
   // Jacobians by the other lens parameters are zero, for solves that hold them; with effects: all.
   LensDerivatives by_lens = LensDerivatives::kAll;
   std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
-  // Each frame has a time of its own, a parameter: an offset from its stamp (CoplanarityPlane).
+  // Each frame has a time of its own, a parameter: an offset from its stamp (CoplanarityPlane,
+  // RelativeRotation).
   bool own_times = false;
 
   // Rates that the pair needs: their times, strictly increasing, split into consecutive groups of
@@ -41,8 +48,8 @@ struct PairMeasurement {
     return (rate_group_sizes[group] + rate_step - 1) / rate_step;
   }
 
-  double variance_a() const { return noise == MatchNoise::kBothImages ? sigma_px * sigma_px : 0.0; }
-  double variance_b() const { return sigma_px * sigma_px; }
+  double variance_a() const { return noise == MatchNoise::kBothImages ? sigma * sigma : 0.0; }
+  double variance_b() const { return sigma * sigma; }
 };
 
 // Order of the parameter blocks of the coplanarity factors:

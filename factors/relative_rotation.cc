@@ -6,29 +6,56 @@
 
 #include "core/pair_model.h"
 #include "core/so3.h"
-#include "factors/pair_bearings.h"
 #include "factors/robust.h"
 #include "factors/rotation_manifold.h"
 
 namespace camgyro {
 
-RelativeRotation::RelativeRotation(std::shared_ptr<const Measurement> measurement)
-    : measurement_(std::move(measurement)) {
-  const Measurement& m = *measurement_;
-  CHECK_GT(m.sigma_rad, 0.0);
+namespace {
+
+// By each rate group; J_phi_a: by the left perturbation of the chain at a, minus that by b.
+void WriteRateJacobians(const PairMeasurement& m, const RotationChain& chain,
+                        const RotationChain::State& a, const RotationChain::State& b,
+                        const Eigen::Matrix3d& J_phi_a, double** jacobians) {
+  Eigen::Matrix3Xd by_rates(3, chain.size());
+  for (int i = 0; i < 3; ++i) {
+    by_rates.setZero();
+    const Eigen::Vector3d by_phi = J_phi_a.row(i);
+    chain.AddRateGradient(a, by_phi, Eigen::Vector3d::Zero(), by_rates);
+    chain.AddRateGradient(b, -by_phi, Eigen::Vector3d::Zero(), by_rates);
+    int column = 0;
+    for (size_t g = 0; g < m.rate_group_sizes.size(); ++g) {
+      const int size = m.rate_group_sizes[g];
+      if (double* J = jacobians[g]) {
+        Eigen::Map<Eigen::Matrix3Xd>(J + 3 * size * i, 3, size) = by_rates.middleCols(column, size);
+      }
+      column += size;
+    }
+  }
+}
+
+}  // namespace
+
+RelativeRotation::RelativeRotation(std::shared_ptr<const PairMeasurement> pair)
+    : pair_(std::move(pair)) {
+  const PairMeasurement& m = *pair_;
+  CHECK_GT(m.sigma, 0.0);
   CHECK_GE(m.rate_times_s.size(), 2u);
+  CHECK(m.matches.empty());
+  CHECK_EQ(m.rate_step, 1);
   set_num_residuals(3);
   *mutable_parameter_block_sizes() = {kShutterSize, 4};
   if (m.effects) mutable_parameter_block_sizes()->push_back(m.effects->size());
-  if (m.own_times) mutable_parameter_block_sizes()->resize(parameter_block_sizes().size() + 2, 1);
+  mutable_parameter_block_sizes()->resize(
+      parameter_block_sizes().size() + static_cast<size_t>(NumTimeBlocks(m)), 1);
   for (const int size : m.rate_group_sizes) mutable_parameter_block_sizes()->push_back(3 * size);
 }
 
 bool RelativeRotation::Evaluate(double const* const* parameters, double* residuals,
                                 double** jacobians) const {
-  const Measurement& m = *measurement_;
-  const int times_block = kEffectsBlock + (m.effects ? 1 : 0);
-  const int first_rate_group = times_block + (m.own_times ? 2 : 0);
+  const PairMeasurement& m = *pair_;
+  const int times_block = kEffectsBlock + NumEffectBlocks(m);
+  const int first_rate_group = times_block + NumTimeBlocks(m);
   const RotationChain chain(m.rate_times_s,
                             GatherRates(m.rate_group_sizes, parameters + first_rate_group));
   double time_a_s = m.frame_a.stamp_s + m.frame_a.offset_s;
@@ -60,9 +87,9 @@ bool RelativeRotation::Evaluate(double const* const* parameters, double* residua
   const Eigen::Vector3d log_error = Log(Eigen::Quaterniond(error));
   Eigen::Matrix3d robust = Eigen::Matrix3d::Zero();
   for (int i = 0; i < 3; ++i) {
-    const RobustResidual r = Robustify(log_error[i] / m.sigma_rad, m.robust_threshold);
+    const RobustResidual r = Robustify(log_error[i] / m.sigma, m.robust_threshold);
     residuals[i] = r.value;
-    robust(i, i) = r.derivative / m.sigma_rad;
+    robust(i, i) = r.derivative / m.sigma;
   }
   if (jacobians == nullptr) return true;
 
@@ -94,21 +121,7 @@ bool RelativeRotation::Evaluate(double const* const* parameters, double* residua
     Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> J(jacobians[1]);
     for (int i = 0; i < 3; ++i) J.row(i) = RotationManifold::Lift(J_rotation.row(i), parameters[1]);
   }
-  Eigen::Matrix3Xd by_rates(3, chain.size());
-  for (int i = 0; i < 3; ++i) {
-    by_rates.setZero();
-    const Eigen::Vector3d by_phi = J_phi_a.row(i);
-    chain.AddRateGradient(a, by_phi, Eigen::Vector3d::Zero(), by_rates);
-    chain.AddRateGradient(b, -by_phi, Eigen::Vector3d::Zero(), by_rates);
-    int column = 0;
-    for (size_t g = 0; g < m.rate_group_sizes.size(); ++g) {
-      const int size = m.rate_group_sizes[g];
-      if (double* J = jacobians[static_cast<size_t>(first_rate_group) + g]) {
-        Eigen::Map<Eigen::Matrix3Xd>(J + 3 * size * i, 3, size) = by_rates.middleCols(column, size);
-      }
-      column += size;
-    }
-  }
+  WriteRateJacobians(m, chain, a, b, J_phi_a, jacobians + first_rate_group);
   return true;
 }
 

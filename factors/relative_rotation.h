@@ -4,11 +4,9 @@
 
 #include <ceres/cost_function.h>
 
-#include <Eigen/Geometry>
 #include <memory>
-#include <vector>
 
-#include "core/effects/catalogue.h"
+#include "factors/pair_bearings.h"
 
 namespace camgyro {
 
@@ -17,8 +15,8 @@ namespace camgyro {
 //
 // Parameters  shutter      2   t_r [s], t_d [s]
 //             q_gyro_cam   4   RotationManifold
-//             effects      of Measurement::effects, if there are any
-//             times        1 and 1, with Measurement::own_times: offsets of the two frames from
+//             effects      of PairMeasurement::effects, if there are any
+//             times        1 and 1, with PairMeasurement::own_times: offsets of the two frames from
 //                          their stamps [s]; give them a prior
 //             rates        3 n_g each, one block per rate group, gyro frame [rad/s]
 // Residual    3, in sigmas, in the gyro frame of the second exposure
@@ -27,19 +25,8 @@ namespace camgyro {
 //             neighbouring camera rotations share the error of the attitude between them
 class RelativeRotation final : public ceres::CostFunction {
  public:
-  struct Measurement {
-    Eigen::Quaterniond q_a_b;  // vectors of camera b into camera a
-    FrameTime frame_a, frame_b;
-    double row_fraction = 0.0;                 // row that the rotation refers to, of the height
-    double sigma_rad = 0.0;                    // > 0, per axis
-    double robust_threshold = 0.0;             // in sigmas of each axis; 0: no loss
-    std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
-    bool own_times = false;                    // each frame has a time of its own
-    std::vector<double> rate_times_s;
-    std::vector<int> rate_group_sizes;
-  };
-
-  explicit RelativeRotation(std::shared_ptr<const Measurement> measurement);
+  // pair: without matches, and with a value of its own for each rate (CHECKed).
+  explicit RelativeRotation(std::shared_ptr<const PairMeasurement> pair);
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
@@ -47,7 +34,7 @@ class RelativeRotation final : public ceres::CostFunction {
   static constexpr int kEffectsBlock = 2;  // times, or the first rate group, without effects
 
  private:
-  const std::shared_ptr<const Measurement> measurement_;
+  const std::shared_ptr<const PairMeasurement> pair_;
 };
 
 }  // namespace camgyro

@@ -63,7 +63,7 @@ class Transfer {
 
 SymmetricTransfer::SymmetricTransfer(std::shared_ptr<const PairMeasurement> pair)
     : pair_(std::move(pair)) {
-  CHECK_GT(pair_->sigma_px, 0.0);
+  CHECK_GT(pair_->sigma, 0.0);
   CHECK_GE(pair_->rate_times_s.size(), 2u);
   CHECK(pair_->effects == nullptr);
   set_num_residuals(kResidualsPerMatch * static_cast<int>(pair_->matches.size()));

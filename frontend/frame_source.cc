@@ -17,31 +17,28 @@ namespace {
 class ImageFrames : public FrameSource {
  public:
   ImageFrames(const Recording& recording, PictureFormat format)
-      : recording_(recording), format_(format) {}
+      : FrameSource(recording), format_(format) {}
 
-  Result<bool> Next(cv::Mat* picture) override {
+ protected:
+  Result<bool> Decode(Decoded* decoded) override {
     if (next_ == recording_.frames.size()) return false;
     const std::string& file = recording_.frames[next_].image_file;
     const bool gray = format_ == PictureFormat::kGray;
     Result<cv::Mat> image = gray ? ReadGrayImage(file) : ReadColourImage(file);
     if (!image) return tl::unexpected(image.error());
-    if (image->cols != recording_.camera.width_px || image->rows != recording_.camera.height_px) {
-      return BadInput(Concat(file, ": has ", image->cols, " x ", image->rows, " pixels, expected ",
-                             recording_.camera.width_px, " x ", recording_.camera.height_px,
-                             " as the frames before it"));
-    }
+    decoded->width_px = image->cols;
+    decoded->height_px = image->rows;
+    decoded->place = Concat(file, ": frame ", ++next_);
     if (gray) {
-      *picture = std::move(*image);
+      decoded->picture = std::move(*image);
     } else {
       const cv::Rect even(0, 0, image->cols & ~1, image->rows & ~1);
-      cv::cvtColor((*image)(even), *picture, cv::COLOR_BGR2YUV_I420);
+      cv::cvtColor((*image)(even), decoded->picture, cv::COLOR_BGR2YUV_I420);
     }
-    ++next_;
     return true;
   }
 
  private:
-  const Recording& recording_;
   const PictureFormat format_;
   size_t next_ = 0;
 };
@@ -49,7 +46,7 @@ class ImageFrames : public FrameSource {
 class VideoFrames : public FrameSource {
  public:
   VideoFrames(const Recording& recording, PictureFormat picture_format)
-      : recording_(recording),
+      : FrameSource(recording),
         picture_format_(picture_format),
         packet_(av_packet_alloc()),
         frame_(av_frame_alloc()) {}
@@ -72,15 +69,21 @@ class VideoFrames : public FrameSource {
     return {};
   }
 
-  Result<bool> Next(cv::Mat* picture) override {
-    const Result<bool> decoded = Decode();
-    if (!decoded) return decoded;
+ protected:
+  Result<bool> Decode(Decoded* decoded) override {
     const size_t expected = recording_.frames.size();
-    if (!*decoded) {
-      if (next_ == expected) return false;
-      return BadInput(
-          Concat(File(), ": ends after frame ", next_, ", expected ", expected, " frames"));
-    }
+    // The video may go on with pictures that were left out.
+    if (next_ == expected && expected > 0 && recording_.frames.back().picture >= 0) return false;
+    do {
+      const Result<bool> received = Receive();
+      if (!received) return received;
+      if (!*received) {
+        if (next_ == expected) return false;
+        return BadInput(
+            Concat(File(), ": ends after frame ", next_, ", expected ", expected, " frames"));
+      }
+      ++pictures_;
+    } while (next_ < expected && pictures_ <= recording_.PictureOf(next_));
     if (next_ == expected) {
       return BadInput(
           Concat(File(), ": has a frame ", next_ + 1, ", expected ", expected, " frames"));
@@ -88,13 +91,10 @@ class VideoFrames : public FrameSource {
     if (frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
       return BadInput(Concat(File(), ": frame ", next_ + 1, " is damaged"));
     }
-    if (frame_->width != recording_.camera.width_px ||
-        frame_->height != recording_.camera.height_px) {
-      return BadInput(Concat(File(), ": frame ", next_ + 1, " has ", frame_->width, " x ",
-                             frame_->height, " pixels, expected ", recording_.camera.width_px,
-                             " x ", recording_.camera.height_px));
-    }
-    if (Status converted = Convert(picture); !converted) {
+    decoded->width_px = frame_->width;
+    decoded->height_px = frame_->height;
+    decoded->place = Concat(File(), ": frame ", pictures_);
+    if (Status converted = Convert(&decoded->picture); !converted) {
       return tl::unexpected(converted.error());
     }
     av_frame_unref(frame_.get());
@@ -106,7 +106,7 @@ class VideoFrames : public FrameSource {
   const std::string& File() const { return recording_.video_file; }
 
   // The next picture into frame_; false at the end of the file.
-  Result<bool> Decode() {
+  Result<bool> Receive() {
     for (;;) {
       int code = avcodec_receive_frame(codec_.get(), frame_.get());
       if (code >= 0) return true;
@@ -178,7 +178,6 @@ class VideoFrames : public FrameSource {
     sws_scale(to_gray_.get(), frame_->data, frame_->linesize, 0, frame_->height, planes, strides);
   }
 
-  const Recording& recording_;
   const PictureFormat picture_format_;
   FfmpegPtr<AVFormatContext> format_;
   FfmpegPtr<AVCodecContext> codec_;
@@ -186,10 +185,34 @@ class VideoFrames : public FrameSource {
   FfmpegPtr<AVPacket> packet_;
   FfmpegPtr<AVFrame> frame_, converted_;
   int stream_ = -1;
-  size_t next_ = 0;
+  size_t pictures_ = 0;  // received
+  size_t next_ = 0;      // frame
 };
 
 }  // namespace
+
+Result<bool> FrameSource::NextOfAnySize(cv::Mat* picture, std::string* complaint) {
+  Decoded decoded;
+  decoded.picture = std::move(*picture);  // its memory is used again
+  const Result<bool> more = Decode(&decoded);
+  if (!more || !*more) return more;
+  const CameraGuess& camera = recording_.camera;
+  if (decoded.width_px == camera.width_px && decoded.height_px == camera.height_px) {
+    *picture = std::move(decoded.picture);
+  } else {
+    *complaint = Concat(decoded.place, " has ", decoded.width_px, " x ", decoded.height_px,
+                        " pixels, expected ", camera.width_px, " x ", camera.height_px);
+    picture->release();
+  }
+  return true;
+}
+
+Result<bool> FrameSource::Next(cv::Mat* picture) {
+  std::string complaint;
+  const Result<bool> more = NextOfAnySize(picture, &complaint);
+  if (!complaint.empty()) return BadInput(complaint);
+  return more;
+}
 
 Result<std::unique_ptr<FrameSource>> OpenFrames(const Recording& recording, PictureFormat format) {
   if (!recording.HasImages()) {

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <string>
 
 #include "core/recording.h"
 #include "core/result.h"
@@ -20,11 +21,28 @@ enum class PictureFormat {
 
 class FrameSource {
  public:
+  // The recording must outlive the source.
+  explicit FrameSource(const Recording& recording) : recording_(recording) {}
   virtual ~FrameSource() = default;
 
   // Decodes the next frame of Recording::frames. False at the end of the recording; an error names
-  // the file and what was wrong with it.
-  virtual Result<bool> Next(cv::Mat* picture) = 0;
+  // the file and what was wrong with it, a picture of another size than the camera's included.
+  Result<bool> Next(cv::Mat* picture);
+
+  // The same, but a picture of another size is no error: *picture is empty then, and *complaint
+  // says which it was.
+  Result<bool> NextOfAnySize(cv::Mat* picture, std::string* complaint);
+
+ protected:
+  struct Decoded {
+    cv::Mat picture;
+    int width_px = 0, height_px = 0;
+    std::string place;  // "file: frame 3", for complaints
+  };
+  // The next frame as it is stored; false at the end.
+  virtual Result<bool> Decode(Decoded* decoded) = 0;
+
+  const Recording& recording_;
 };
 
 // Opens the images or the video of a recording. The recording must outlive the source.

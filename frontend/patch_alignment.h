@@ -9,6 +9,8 @@
 
 namespace camgyro {
 
+constexpr int kMaxPatchPx = 31;  // widest patch
+
 struct AlignedPatch {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();  // of its middle
   // Of px, over the variance of the grey values' noise [px^2 / grey^2].
@@ -17,8 +19,9 @@ struct AlignedPatch {
 
 // The inverse compositional algorithm (Baker & Matthews, IJCV 2004) for an affine warp with gain
 // and offset, Gaussian weights and a weak prior against deformation. before, after: 8-bit grey. The
-// patch around px_before [px] is window_px wide (odd); `guess` [px] is where the search begins.
-// Nothing if the patch leaves a picture, has no texture, or the search goes astray.
+// patch around px_before [px] is window_px wide (odd, at most kMaxPatchPx); `guess` [px] is where
+// the search begins. Nothing if the width is none of these, the patch leaves a picture, has no
+// texture, or the search goes astray.
 std::optional<AlignedPatch> AlignPatch(const cv::Mat& before, const Eigen::Vector2d& px_before,
                                        const cv::Mat& after, const Eigen::Vector2d& guess,
                                        int window_px);

@@ -98,18 +98,36 @@ size_t SamplesIn(double seconds, double period_s, size_t least) {
   return std::max(least, static_cast<size_t>(std::lround(seconds / period_s)));
 }
 
-// Period from the stamps' differences over some samples, in the middle of their distribution.
-double RoughPeriod(const std::vector<double>& t) {
-  // A clean stream with many missing samples: nearly all intervals are multiples of the median.
+// Of a clean stream, also with many missing samples, nearly all intervals are multiples of the
+// median: that one, without what stamps scatter by. 0 for others.
+double PeriodOfMultiples(const std::vector<double>& t) {
   std::vector<double> steps;
   for (size_t i = 1; i < t.size(); ++i) steps.push_back(t[i] - t[i - 1]);
   const double median = Quantile(steps, 0.5);
+  if (!(median > 0.0)) return 0.0;
   size_t multiples = 0;
+  double sum_s = 0.0, sum_periods = 0.0;
   for (const double step : steps) {
     const double periods = std::round(step / median);
-    if (periods >= 1.0 && std::abs(step - periods * median) < 0.03 * median) ++multiples;
+    if (periods < 1.0 || std::abs(step - periods * median) > 0.03 * median) continue;
+    ++multiples;
+    sum_s += step;
+    sum_periods += periods;
   }
-  if (median > 0.0 && multiples > 0.95 * static_cast<double>(steps.size())) return median;
+  return multiples > 0.95 * static_cast<double>(steps.size()) ? sum_s / sum_periods : 0.0;
+}
+
+// Numbers by intervals that are multiples of the period.
+std::vector<int64_t> NumberByIntervals(const std::vector<double>& t, double period_s) {
+  std::vector<int64_t> number(t.size(), 0);
+  for (size_t i = 1; i < t.size(); ++i) {
+    number[i] = number[i - 1] + std::llround((t[i] - t[i - 1]) / period_s);
+  }
+  return number;
+}
+
+// Period from the stamps' differences over some samples, in the middle of their distribution.
+double RoughPeriod(const std::vector<double>& t) {
   const size_t lag = std::min(kSlopeLag, t.size() / 4);
   std::vector<double> slopes;
   for (size_t i = lag; i < t.size(); ++i) {
@@ -247,6 +265,31 @@ bool IsLate(const std::vector<double>& late, double period_s, double scatter_s) 
   return count >= kFewestLate;
 }
 
+// By how much the median stamp is behind the clock, and how well that is known from its scatter
+// over stretches of the recording.
+double MedianLateness(const std::vector<double>& late, const std::vector<double>& clock,
+                      double* sigma_s) {
+  constexpr size_t kStretches = 16;
+  std::vector<double> distances(late.size());
+  for (size_t i = 0; i < late.size(); ++i) distances[i] = late[i] - clock[i];
+  const size_t stretches = std::min(kStretches, distances.size() / kFewestInBlock);
+  double sum = 0.0, squares = 0.0;
+  for (size_t k = 0; k < stretches; ++k) {
+    const auto at = [&](size_t part) {
+      return distances.begin() + static_cast<std::ptrdiff_t>(part * distances.size() / stretches);
+    };
+    const double median = Quantile({at(k), at(k + 1)}, 0.5);
+    sum += median;
+    squares += median * median;
+  }
+  const auto count = static_cast<double>(stretches);
+  if (stretches > 1) {
+    const double variance = std::max(0.0, squares - sum * sum / count) / (count - 1.0);
+    *sigma_s = std::sqrt(variance / count);
+  }
+  return Quantile(std::move(distances), 0.5);
+}
+
 }  // namespace
 
 StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_clean) {
@@ -258,10 +301,12 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_cl
   for (size_t i = 0; i < n; ++i) t[i] = SecondsSince(stamps_ns.front(), stamps_ns[i]);
   report.period_s = t.back() / static_cast<double>(n - 1);
   if (n < kFewestStamps) return found;
-  double period_s = RoughPeriod(t);
+  double period_s = PeriodOfMultiples(t);
+  const auto number_samples = period_s > 0.0 ? NumberByIntervals : NumberSamples;
+  if (!(period_s > 0.0)) period_s = RoughPeriod(t);
   if (!(period_s > 0.0)) return found;
 
-  std::vector<int64_t> number = NumberSamples(t, period_s);
+  std::vector<int64_t> number = number_samples(t, period_s);
   for (int round = 0; round < 2; ++round) {  // with a better period, better numbers
     const std::vector<Point> points = EarliestOfBlocks(number, Lateness(t, number, period_s), 0, n,
                                                        std::max(kFewestInBlock, n / 80));
@@ -269,7 +314,7 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_cl
     const double better_s = period_s + QuantileLine(points, kEarlyBlocks).slope;
     if (!(better_s > 0.5 * period_s && better_s < 2.0 * period_s)) break;
     period_s = better_s;
-    number = NumberSamples(t, period_s);
+    number = number_samples(t, period_s);
   }
   const std::vector<double> late = Lateness(t, number, period_s);
   report.period_s = period_s;
@@ -306,9 +351,10 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_cl
                       : StampKind::kArrival;
   }
   if (report.kind == StampKind::kIrregular) return found;
+  const double level_s = MedianLateness(late, clock, &report.level_sigma_s);
   found.sampled_ns.resize(n);
   for (size_t i = 0; i < n; ++i) {
-    const double sampled_s = period_s * static_cast<double>(number[i]) + clock[i];
+    const double sampled_s = period_s * static_cast<double>(number[i]) + clock[i] + level_s;
     found.sampled_ns[i] = StampAt(stamps_ns.front(), sampled_s);
     if (i > 0 && found.sampled_ns[i] <= found.sampled_ns[i - 1]) {  // clocks of two stretches
       found.sampled_ns[i] = found.sampled_ns[i - 1] + 1;

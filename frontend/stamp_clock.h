@@ -3,9 +3,10 @@
 // A sensor samples by a clock of its own: a period, slow drift, now and then a missing sample.
 // Stamps are readings of that clock, or the times at which samples arrived in a program: later by
 // a latency that is positive, heavy-tailed, shared by the samples of a bunch or packet, sometimes
-// rounded to milliseconds. The clock is then the lower envelope of the stamps over the samples'
-// numbers (as for one-way delays in networks: Zhang, Liu, Xia, "Clock synchronization algorithms
-// for network measurements", INFOCOM 2002).
+// rounded to milliseconds. The clock's rate is then that of the lower envelope of the stamps over
+// the samples' numbers (as for one-way delays in networks: Zhang, Liu, Xia, "Clock synchronization
+// algorithms for network measurements", INFOCOM 2002). Its offset is such that the median stamp is
+// on time: the least latency of a stream is a matter of a few of its stamps, the usual one is not.
 #ifndef CAMGYRO_FRONTEND_STAMP_CLOCK_H_
 #define CAMGYRO_FRONTEND_STAMP_CLOCK_H_
 
@@ -27,8 +28,9 @@ struct StampClock {
 // Finds the clock. `stamps_ns`: in the order of the samples, not decreasing (several may be equal).
 // Fewer than 40 stamps are kMeasured.
 //
-//   - samples are numbered, a number is skipped where the lower envelope of the stamps rises for
-//     good by a period: late samples are caught up, missing ones are not;
+//   - samples are numbered: where nearly all intervals are multiples of a period, by these; else a
+//     number is skipped where the lower envelope of the stamps rises for good by a period (late
+//     samples are caught up, missing ones are not);
 //   - stamps are kArrival only where the evidence is clear: neighbouring intervals scatter by more
 //     than 1 % of the period (and 0.05 ms), or samples come late by more than half a period (or 5
 //     ms) and are caught up;

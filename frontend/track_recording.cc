@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
+#include <cstdint>
+#include <iterator>
 #include <memory>
-#include <opencv2/core/mat.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string>
 #include <utility>
 
@@ -21,6 +22,12 @@ constexpr double kMinMatches = 8.0;  // per pair, median; 2 go into the translat
 // Below it, vibration and the tracker's own errors are what one would calibrate on.
 // (euroc-v101-rest: 0.15 px, rotors running; gopro-hero5-karma, hardly turning: 0.43 px.)
 constexpr double kMinMotionPx = 0.3;
+// Grey levels between the darkest and the brightest parts of a picture, of the means of blocks.
+// Read noise of 16 levels, as in the dark with all the gain there is, leaves means of 16 x 16
+// pixels with 1 level, and 4 between the 2 % that are darkest and brightest.
+constexpr int kBlockPx = 16;
+constexpr double kLeastContrast = 5.0;
+constexpr double kDarkest = 0.02;
 
 std::optional<GyroRotation> RotationBetween(const Recording& recording,
                                             const Calibration* calibration, size_t frame_a) {
@@ -28,6 +35,37 @@ std::optional<GyroRotation> RotationBetween(const Recording& recording,
   return GyroRotation::Between(recording.gyro, *calibration, recording.frames[frame_a].stamp_ns,
                                recording.frames[frame_a + 1].stamp_ns);
 }
+
+// Frames that cannot be tracked, by the reason.
+struct UnusableFrames {
+  std::vector<int> of_another_size, showing_nothing;  // ascending
+  std::string first_size;                             // which, of what size, and what was expected
+
+  Status LeaveOut(Recording* recording) const {
+    const size_t all = recording->frames.size();
+    if (2 * of_another_size.size() > all) {
+      return BadInput(Format("%s; so it is in %zu of %zu frames", first_size.c_str(),
+                             of_another_size.size(), all));
+    }
+    std::vector<int> left_out;
+    std::merge(of_another_size.begin(), of_another_size.end(), showing_nothing.begin(),
+               showing_nothing.end(), std::back_inserter(left_out));
+    LeaveOutFrames(left_out, /*repeats=*/false, recording);
+    const auto add = [&](const char* name, size_t count, const std::string& finding) {
+      if (count == 0) return;
+      recording->faults.push_back({name, static_cast<int>(count), finding});
+      recording->notes.push_back(finding);
+    };
+    add("frames_of_another_size", of_another_size.size(),
+        Format("%s; %zu such frames are left out", first_size.c_str(), of_another_size.size()));
+    add("frames_without_contrast", showing_nothing.size(),
+        Format("%zu of %zu pictures show nothing (a lens cap? darkness?), the first is frame %d; "
+               "they are left out",
+               showing_nothing.size(), all,
+               showing_nothing.empty() ? 0 : showing_nothing.front() + 1));
+    return {};
+  }
+};
 
 // Returns the share of wrong matches.
 double CutTracksAtOutliers(const Calibration* calibration, Recording* recording) {
@@ -45,6 +83,17 @@ double CutTracksAtOutliers(const Calibration* calibration, Recording* recording)
 }
 
 }  // namespace
+
+bool ShowsNothing(const cv::Mat& gray) {
+  cv::Mat blocks;
+  cv::resize(gray, blocks,
+             cv::Size(std::max(1, gray.cols / kBlockPx), std::max(1, gray.rows / kBlockPx)), 0.0,
+             0.0, cv::INTER_AREA);
+  std::vector<uint8_t> means(blocks.begin<uint8_t>(), blocks.end<uint8_t>());
+  std::sort(means.begin(), means.end());
+  const auto at = static_cast<size_t>(kDarkest * static_cast<double>(means.size() - 1));
+  return means[means.size() - 1 - at] - means[at] < kLeastContrast;
+}
 
 ImageMotion MeasureImageMotion(const Recording& recording) {
   ImageMotion motion;
@@ -84,11 +133,20 @@ Result<TrackingSummary> TrackRecording(const TrackerOptions& options,
   if (!source) return tl::unexpected(source.error());
   KltTracker tracker(options);
   std::vector<std::vector<TrackedPoint>> tracks;
-  cv::Mat gray;
+  UnusableFrames unusable;
   for (size_t i = 0; i < recording->frames.size(); ++i) {
-    const Result<bool> more = (*source)->Next(&gray);
+    cv::Mat gray;
+    std::string complaint;
+    const Result<bool> more = (*source)->NextOfAnySize(&gray, &complaint);
     if (!more) return tl::unexpected(more.error());
     if (!*more) break;
+    if (gray.empty()) {
+      if (unusable.of_another_size.empty()) unusable.first_size = complaint;
+      unusable.of_another_size.push_back(static_cast<int>(i));
+    } else if (ShowsNothing(gray)) {
+      unusable.showing_nothing.push_back(static_cast<int>(i));
+      gray.release();
+    }
     PointPredictor predictor;
     std::optional<GyroRotation> rotation;
     if (i > 0) rotation = RotationBetween(*recording, calibration, i - 1);
@@ -99,6 +157,7 @@ Result<TrackingSummary> TrackRecording(const TrackerOptions& options,
   recording->tracks = std::move(tracks);
   recording->matches.clear();
   recording->match_noise = MatchNoise::kSecondImage;
+  if (Status left = unusable.LeaveOut(recording); !left) return tl::unexpected(left.error());
 
   TrackingSummary summary;
   summary.outlier_ratio = CutTracksAtOutliers(calibration, recording);

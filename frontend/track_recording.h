@@ -3,6 +3,7 @@
 #define CAMGYRO_FRONTEND_TRACK_RECORDING_H_
 
 #include <functional>
+#include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "core/calibration.h"
@@ -24,6 +25,10 @@ ImageMotion MeasureImageMotion(const Recording& recording);
 // kCannotEstimate if there are too few matches per pair for any estimate, or nothing moves.
 Status CheckImageMotion(const Recording& recording);
 
+// A picture of a lens cap, of the dark, of nothing but light: no corner in it is one of the scene.
+// `gray`: 8-bit, one channel.
+bool ShowsNothing(const cv::Mat& gray);
+
 struct TrackingSummary {
   double outlier_ratio = 0.0;  // share of matches taken for wrong
   double seconds = 0.0;
@@ -34,12 +39,14 @@ using TrackingProgress = std::function<void(double done)>;
 
 // Decodes all frames, follows corners, and cuts tracks where a match is wrong: the track goes on
 // under a new id. Sets `tracks` (one entry per frame), `match_noise`, removes
-// `matches`.
+// `matches`. Frames whose picture shows nothing, or has another size than the camera's, are left
+// out, and counted in the recording's faults; tracks end at them.
 //
 // Without a calibration, wrong is what RejectByBinHomography rejects; with one, the gyro predicts
 // where points go, and wrong is what is off its epipolar line (outliers.h).
 //
-// Errors of the files; kCannotEstimate as CheckImageMotion.
+// Errors of the files, among them a recording most of whose pictures have another size;
+// kCannotEstimate as CheckImageMotion.
 Result<TrackingSummary> TrackRecording(const TrackerOptions& options,
                                        const Calibration* calibration,
                                        const TrackingProgress& progress, Recording* recording);

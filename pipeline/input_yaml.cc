@@ -29,6 +29,7 @@ void EmitStamps(const char* key, const std::optional<StampReport>& report, YAML:
   *out << YAML::Key << "jitter_s" << YAML::Value << report->jitter_s;
   *out << YAML::Key << "latest_s" << YAML::Value << report->latest_s;
   *out << YAML::Key << "residual_s" << YAML::Value << report->residual_s;
+  *out << YAML::Key << "level_sigma_s" << YAML::Value << report->level_sigma_s;
   *out << YAML::Key << "missing" << YAML::Value << report->missing;
   *out << YAML::Key << "repaired" << YAML::Value << report->repaired << YAML::EndMap;
 }

@@ -139,31 +139,43 @@ std::vector<std::string> Names(const Section& section, const char* key) {
   }
 }
 
-void ParseCovariance(const Section& section, Calibration* c) {
-  const std::vector<std::string> order = Names(section, "order");
-  const YAML::Node matrix = section.Child("matrix");
-  if (!matrix && order.empty()) return;
+// The matrix `key` of the section into the parameters that `order` names. False: it is not there.
+bool ParseMatrix(const Section& section, const char* key, const std::vector<std::string>& order,
+                 StateCovariance* covariance) {
+  const YAML::Node matrix = section.Child(key);
+  if (!matrix) return false;
   const std::string expected =
       "expected a square matrix of finite numbers, a row for each name of order";
   std::vector<std::vector<double>> rows;
   try {
-    if (matrix) rows = matrix.as<std::vector<std::vector<double>>>();
+    rows = matrix.as<std::vector<std::vector<double>>>();
   } catch (const YAML::Exception&) {
-    section.Fail(matrix, "matrix", expected);
+    section.Fail(matrix, key, expected);
   }
   const auto bad_row = [&](const std::vector<double>& row) {
     return row.size() != order.size() ||
            !std::all_of(row.begin(), row.end(), [](double v) { return std::isfinite(v); });
   };
   if (rows.size() != order.size() || std::any_of(rows.begin(), rows.end(), bad_row)) {
-    section.Fail(matrix, "matrix", expected);
+    section.Fail(matrix, key, expected);
   }
   for (size_t i = 0; i < order.size(); ++i) {
     for (size_t j = 0; j < order.size(); ++j) {
       const int row = StateOf(order[i]), column = StateOf(order[j]);
-      if (row >= 0 && column >= 0) c->covariance(row, column) = rows[i][j];
+      if (row >= 0 && column >= 0) (*covariance)(row, column) = rows[i][j];
     }
   }
+  return true;
+}
+
+void ParseCovariance(const Section& section, Calibration* c) {
+  const std::vector<std::string> order = Names(section, "order");
+  if (!ParseMatrix(section, "matrix", order, &c->covariance) && !order.empty()) {
+    section.Fail(YAML::Node(YAML::NodeType::Undefined), "matrix",
+                 "expected a square matrix of finite numbers, a row for each name of order");
+  }
+  StateCovariance total = StateCovariance::Zero();
+  if (ParseMatrix(section, "total", order, &total)) c->total_covariance = total;
 }
 
 Calibration Parse(const YAML::Node& root) {

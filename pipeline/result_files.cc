@@ -27,15 +27,30 @@ Values Segment(const StateVector& state, int first, int size) {
   return {state.data() + first, state.data() + first + size};
 }
 
-void EmitScalar(YAML::Emitter& out, const char* key, double value, double sigma) {
-  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
-      << YAML::Value << value << YAML::Key << "sigma" << YAML::Value << sigma << YAML::EndMap;
+void EmitValue(YAML::Emitter& out, double value, double sigma) {
+  out << YAML::Flow << YAML::BeginMap << YAML::Key << "value" << YAML::Value << value << YAML::Key
+      << "sigma" << YAML::Value << sigma << YAML::EndMap;
 }
 
-void EmitVector(YAML::Emitter& out, const char* key, const Values& value, const char* sigma_key,
-                const Values& sigma) {
-  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
-      << YAML::Value << value << YAML::Key << sigma_key << YAML::Value << sigma << YAML::EndMap;
+// `size` parameters of the state from `first` on: their values with the sigma of noise and, where
+// it is known, that of everything. unit: after "sigma" in the keys.
+void EmitState(YAML::Emitter& out, const char* key, const Values& value, const Calibration& c,
+               int first, int size, const std::string& unit = "") {
+  const auto emit = [&](const std::string& name, const Values& values) {
+    out << YAML::Key << name << YAML::Value;
+    if (values.size() == 1) {
+      out << values[0];
+    } else {
+      out << values;
+    }
+  };
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap;
+  emit("value", value);
+  emit("sigma" + unit, Segment(c.sigma(), first, size));
+  if (const auto total = c.sigma_total()) {
+    emit("sigma_total" + unit, Segment(*total, first, size));
+  }
+  out << YAML::EndMap;
 }
 
 // Standard deviations of the coordinates of the lens block that effects have changed; else zero.
@@ -56,16 +71,16 @@ void BeginSection(YAML::Emitter& out, const char* key) {
 }
 
 void EmitCamera(YAML::Emitter& out, const Calibration& c) {
-  const StateVector sigma = c.sigma();
   BeginSection(out, "camera");
   out << YAML::Key << "resolution" << YAML::Value << YAML::Flow
       << std::vector<int>{c.width_px, c.height_px};
-  EmitScalar(out, "focal_px", c.lens[kFocal], sigma[kStateFocal]);
-  EmitVector(out, "principal_px", {c.lens[kCx], c.lens[kCy]}, "sigma", Segment(sigma, kStateCx, 2));
+  EmitState(out, "focal_px", {c.lens[kFocal]}, c, kStateFocal, 1);
+  EmitState(out, "principal_px", {c.lens[kCx], c.lens[kCy]}, c, kStateCx, 2);
   // Distortion and aspect ratio with what effects have added to them.
   const LensParameters lens = c.FullLens();
   const LensCovariance covariance = FittedLensCovariance(c);
-  EmitScalar(out, "aspect_ratio", lens[kAspect], std::sqrt(covariance(kAspect, kAspect)));
+  out << YAML::Key << "aspect_ratio" << YAML::Value;
+  EmitValue(out, lens[kAspect], std::sqrt(covariance(kAspect, kAspect)));
   const DistortionCoefficients distortion =
       StandardDistortion(c.distortion_model, lens, Eigen::Vector2d(c.width_px, c.height_px));
   Values coefficients, coefficients_sigma;
@@ -102,13 +117,30 @@ void EmitEffects(YAML::Emitter& out, const Calibration& c) {
   out << YAML::EndSeq;
 }
 
+void EmitMatrix(YAML::Emitter& out, const char* key, const StateCovariance& matrix) {
+  out << YAML::Key << key << YAML::Value << YAML::BeginSeq;
+  for (int i = 0; i < kStateSize; ++i) out << YAML::Flow << Segment(matrix.col(i), 0, kStateSize);
+  out << YAML::EndSeq;
+}
+
 void EmitCovariance(YAML::Emitter& out, const Calibration& c) {
   BeginSection(out, "covariance");
   out << YAML::Key << "order" << YAML::Value << YAML::Flow
       << std::vector<std::string>(StateNames().begin(), StateNames().end());
-  out << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
-  for (int i = 0; i < kStateSize; ++i) {
-    out << YAML::Flow << Segment(c.covariance.col(i), 0, kStateSize);
+  EmitMatrix(out, "matrix", c.covariance);
+  if (c.total_covariance) EmitMatrix(out, "total", *c.total_covariance);
+  out << YAML::EndMap;
+}
+
+void EmitSystematic(YAML::Emitter& out, const CalibrationReport& report) {
+  if (!report.calibration.total_covariance) return;
+  BeginSection(out, "systematic");
+  out << YAML::Key << "device" << YAML::Value << report.device_class;
+  out << YAML::Key << "effects" << YAML::Value << YAML::BeginSeq;
+  for (const EffectShare& share : report.systematic) {
+    out << YAML::Flow << YAML::BeginMap << YAML::Key << "name" << YAML::Value << share.effect
+        << YAML::Key << "sigma" << YAML::Value << Segment(share.sigma, 0, kStateSize)
+        << YAML::EndMap;
   }
   out << YAML::EndSeq << YAML::EndMap;
 }
@@ -188,30 +220,32 @@ std::string CalibrationYaml(const CalibrationReport& report, bool attitudes) {
     c.readout_s = nan;
     c.covariance.topRows<kStateDelay>().setConstant(nan);
     c.covariance.leftCols<kStateDelay>().setConstant(nan);
+    if (c.total_covariance) {
+      c.total_covariance->topRows<kStateDelay>().setConstant(nan);
+      c.total_covariance->leftCols<kStateDelay>().setConstant(nan);
+    }
   }
-  const StateVector sigma = c.sigma();
   YAML::Emitter out;
   out.SetDoublePrecision(kDigits);
   out << YAML::BeginMap;
   EmitCamera(out, c);
   BeginSection(out, "shutter");
-  EmitScalar(out, "readout_s", c.readout_s, sigma[kStateReadout]);
+  EmitState(out, "readout_s", {c.readout_s}, c, kStateReadout, 1);
   out << YAML::EndMap;
   BeginSection(out, "clock");
-  EmitScalar(out, "delay_s", c.delay_s, sigma[kStateDelay]);
+  EmitState(out, "delay_s", {c.delay_s}, c, kStateDelay, 1);
   out << YAML::EndMap;
   BeginSection(out, "gyro");
-  EmitVector(out, "bias_rad_s",
-             {c.bias_gyro_rad_s.x(), c.bias_gyro_rad_s.y(), c.bias_gyro_rad_s.z()}, "sigma",
-             Segment(sigma, kStateBias, 3));
+  const Eigen::Vector3d& b = c.bias_gyro_rad_s;
+  EmitState(out, "bias_rad_s", {b.x(), b.y(), b.z()}, c, kStateBias, 3);
   out << YAML::EndMap;
   BeginSection(out, "extrinsics");
-  EmitVector(out, "q_gyro_cam_wxyz",
-             {c.q_gyro_cam.w(), c.q_gyro_cam.x(), c.q_gyro_cam.y(), c.q_gyro_cam.z()}, "sigma_rad",
-             Segment(sigma, kStateRotation, 3));
+  const Eigen::Quaterniond& q = c.q_gyro_cam;
+  EmitState(out, "q_gyro_cam_wxyz", {q.w(), q.x(), q.y(), q.z()}, c, kStateRotation, 3, "_rad");
   out << YAML::EndMap;
   EmitEffects(out, c);
   EmitCovariance(out, c);
+  EmitSystematic(out, report);
   EmitQuality(out, report, attitudes);
   out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";

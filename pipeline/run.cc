@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/data_faults.h"
+#include "estimator/diagnosis/model_check.h"
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "frontend/camera_rotations.h"
 
@@ -30,7 +31,8 @@ CameraRotationsAtFocal RotationsFrom(const Recording& recording, size_t max_pair
 }
 
 Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEstimator estimator,
-                                      const Progress& progress, Recording* recording) {
+                                      DeviceClass device, const Progress& progress,
+                                      Recording* recording) {
   const Result<TrackingSummary> tracking = EnsureImageMotion(progress, recording);
   if (!tracking) return tl::unexpected(tracking.error());
   const CameraRotationsAtFocal rotations_at = RotationsFrom(*recording);
@@ -39,6 +41,11 @@ Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEst
           ? CalibrateWithEkf(*recording, rotations_at, options, {})
           : CalibrateRecording(*recording, rotations_at, options, progress);
   if (!report) return tl::unexpected(Refusal(*recording, report.error()));
+  if (estimator == OnlineEstimator::kWindow) {
+    if (const auto doubt = CheckModel(*recording, options, device, &*report)) {
+      report->doubts.push_back(*doubt);
+    }
+  }
   if (recording->declared_stabilisation) {
     report->doubts.push_back("the picture was stabilised electronically, says the file (" +
                              *recording->declared_stabilisation + ")");
@@ -46,12 +53,16 @@ Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEst
   return CalibrationRun{*tracking, *std::move(report)};
 }
 
-Result<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options, const Progress& progress,
-                                  Recording* recording) {
+Result<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options, DeviceClass device,
+                                  const Progress& progress, Recording* recording) {
   const Result<TrackingSummary> tracking = EnsureImageMotion(progress, recording);
   if (!tracking) return tl::unexpected(tracking.error());
-  return DiagnosisRun{*tracking,
-                      Diagnose(*recording, RotationsFrom(*recording), options, progress)};
+  DiagnosisRun run{*tracking, Diagnose(*recording, RotationsFrom(*recording), options, progress)};
+  // What the loop says of the model is tested on unseen frames: it needs no doubt beside.
+  for (auto* report : {&run.diagnosis.before, &run.diagnosis.after}) {
+    if (*report) CheckModel(*recording, options.calibrate, device, &**report);
+  }
+  return run;
 }
 
 Error Refusal(const Recording& recording, Error error) {

@@ -9,6 +9,7 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/calibrate.h"
+#include "estimator/diagnosis/device_class.h"
 #include "estimator/diagnosis/diagnose.h"
 #include "estimator/start/focal_scan.h"
 #include "frontend/track_recording.h"
@@ -35,17 +36,19 @@ struct CalibrationRun {
 };
 // Calibrates a recording; its pictures are tracked first, and their tracks stay in it. Errors as
 // EnsureImageMotion and CalibrateRecording. Where the file declares electronic stabilisation, a
-// refusal or a doubt says so.
+// refusal or a doubt says so. The result's total error is that of `device` (CheckModel), but for
+// the filter of the paper.
 Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEstimator estimator,
-                                      const Progress& progress, Recording* recording);
+                                      DeviceClass device, const Progress& progress,
+                                      Recording* recording);
 
 struct DiagnosisRun {
   TrackingSummary tracking;
   Diagnosis diagnosis;
 };
 // The closed loop in the same way. Errors as EnsureImageMotion.
-Result<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options, const Progress& progress,
-                                  Recording* recording);
+Result<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options, DeviceClass device,
+                                  const Progress& progress, Recording* recording);
 
 // An estimator's refusal, with the file's own words where it declares stabilisation.
 Error Refusal(const Recording& recording, Error error);

@@ -29,7 +29,8 @@ CalibrationReport Calibrate(Recording* recording, bool refine) {
     const py::gil_scoped_release release;
     CalibrateOptions options;
     options.refine = refine;
-    return RunCalibration(options, OnlineEstimator::kWindow, nullptr, recording);
+    return RunCalibration(options, OnlineEstimator::kWindow, DeviceClass::kPhone, nullptr,
+                          recording);
   }();
   if (!run) Raise(run.error());
   return std::move(run->report);
@@ -135,7 +136,10 @@ void BindCalibration(py::module_* module) {
           "covariance", [](const Calibration& c) { return c.covariance; },
           "float array (11, 11), in the order of names; px, s, rad/s, rad")
       .def_property_readonly(
-          "sigma", [](const Calibration& c) { return c.sigma(); }, "float array (11,)")
+          "sigma", [](const Calibration& c) { return c.sigma(); }, "float array (11,), of noise")
+      .def_property_readonly(
+          "sigma_total", [](const Calibration& c) { return c.sigma_total(); },
+          "float array (11,), with what effects that nobody has declared may add; None: not known")
       .def_property_readonly(
           "determined",
           [](const Calibration& c) {

@@ -16,7 +16,7 @@
 #include "factors/coplanarity_determinant.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/symmetric_transfer.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {
@@ -45,7 +45,7 @@ struct OnePair {
     pair->frame_a = timed.first();
     pair->frame_b = timed.second();
     pair->size_px << truth.width_px, truth.height_px;
-    pair->sigma_px = 0.5;
+    pair->sigma = 0.5;
     pair->robust_threshold = 2.5;
     pair->lens = &GetLens(truth.distortion_model);
     const double from = timed.time_a_s + truth.delay_s - 0.01;
@@ -163,7 +163,7 @@ void WindowStep(benchmark::State& state) {
   const Simulated s = MakeRecording(60.0);
   const Prior start = StartAt(s.truth);
   SlidingWindowOptions options;
-  options.graph.sigma_px = 0.5;
+  options.graph.sigma = 0.5;
   SlidingWindow window(start.mean, start, s.recording.gyro.front().stamp_ns, options);
   for (const GyroSample& sample : s.recording.gyro) {
     CHECK(window.AddGyroSample(sample) == AddResult::kAccepted);

@@ -40,9 +40,10 @@ Result<CalibrateOptions> OptionsFromFlags() {
   if (Status read = ReadFitFlags(&options.window.graph); !read) {
     return tl::unexpected(read.error());
   }
-  options.residual = options.window.graph.residual;
-  if (options.residual == ResidualKind::kSymmetricTransfer && !FLAGS_effects.empty()) {
-    return BadUsage("--effects=" + FLAGS_effects + ": expected none with --residual=transfer");
+  const PairResidual::Facts& residual = options.window.graph.residual->facts();
+  if (!residual.with_effects && !FLAGS_effects.empty()) {
+    return BadUsage("--effects=" + FLAGS_effects +
+                    ": expected none with --residual=" + residual.name);
   }
   if (!(FLAGS_search_s > 0.0)) return BadUsage("--search_s: expected a positive number");
   if (Status known = CheckRequireFlag(); !known) return tl::unexpected(known.error());
@@ -55,6 +56,8 @@ Result<CalibrateOptions> OptionsFromFlags() {
 Status RunCalibrate(const std::vector<std::string>& arguments) {
   const Result<CalibrateOptions> options = OptionsFromFlags();
   if (!options) return tl::unexpected(options.error());
+  const Result<DeviceClass> device = DeviceFromFlag();
+  if (!device) return tl::unexpected(device.error());
   FileSet files(FLAGS_out.empty() ? "calibration" : FLAGS_out);
   if (Status writable = files.CheckWritable(); !writable) return writable;
   Result<Recording> recording = OpenRecording(arguments[0]);
@@ -71,7 +74,8 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
     ProgressBar bar;
     run = RunCalibration(
         *options, FLAGS_estimator == "ekf" ? OnlineEstimator::kPaperEkf : OnlineEstimator::kWindow,
-        [&](const std::string& stage, double done) { bar.Show(stage, done); }, &*recording);
+        *device, [&](const std::string& stage, double done) { bar.Show(stage, done); },
+        &*recording);
   }
   if (!run) return tl::unexpected(run.error());
   if (Status strict = CheckStrict(*recording); !strict) return strict;
@@ -100,9 +104,9 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   if (!FLAGS_quiet) {
     const std::vector<std::string> found(recording->notes.begin() + static_cast<long>(shown),
                                          recording->notes.end());
-    std::printf("\n%s%s%s%s%s%s%s", Notes("input", found).c_str(),
-                MotionLine(*recording, *tracking).c_str(), StartLine(report->start).c_str(),
-                QualityLine(*report, attitudes).c_str(),
+    std::printf("\n%s%s%s%s%s%s%s%s", SystematicLine(*report).c_str(),
+                Notes("input", found).c_str(), MotionLine(*recording, *tracking).c_str(),
+                StartLine(report->start).c_str(), QualityLine(*report, attitudes).c_str(),
                 TimeLine(*report, tracking->seconds, recording->frames.size()).c_str(),
                 Notes("note", report->notes).c_str(), Notes("doubt", report->doubts).c_str());
     std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv%s\n",
@@ -122,7 +126,7 @@ Command CalibrateCommand() {
       "calibration.yaml (trace.csv: the online estimate over time; delay.csv: the delay search)";
   command.flags = {"out", "effects"};
   for (const std::string& name : FitFlags()) command.flags.push_back(name);
-  command.flags.insert(command.flags.end(), {"estimator", "refine"});
+  command.flags.insert(command.flags.end(), {"device", "estimator", "refine"});
   for (const std::string& name : InputFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"require", "search_s", "quiet"});
   command.run = RunCalibrate;

@@ -9,6 +9,7 @@
 #include "tools/commands.h"
 #include "tools/diagnosis_file.h"
 #include "tools/diagnosis_report.h"
+#include "tools/fit_flags.h"
 #include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/required.h"
@@ -33,6 +34,8 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   }
   options.calibrate.start.search_s = FLAGS_search_s;
   options.significance = FLAGS_significance;
+  const Result<DeviceClass> device = DeviceFromFlag();
+  if (!device) return tl::unexpected(device.error());
   FileSet files(FLAGS_out.empty() ? "calibration" : FLAGS_out);
   if (Status writable = files.CheckWritable(); !writable) return writable;
   Result<Recording> recording = OpenRecording(arguments[0]);
@@ -46,7 +49,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   {
     ProgressBar bar;
     run = RunDiagnosis(
-        options, [&](const std::string& stage, double done) { bar.Show(stage, done); },
+        options, *device, [&](const std::string& stage, double done) { bar.Show(stage, done); },
         &*recording);
   }
   if (!run) return tl::unexpected(run.error());
@@ -76,7 +79,8 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   }
   if (Status written = files.Write(); !written) return written;
   if (diagnosis.before) {
-    std::printf("\n%s\n", ParameterTable(diagnosis.result().calibration, attitudes).c_str());
+    std::printf("\n%s\n%s", ParameterTable(diagnosis.result().calibration, attitudes).c_str(),
+                SystematicLine(diagnosis.result()).c_str());
   }
   std::printf("%s", DiagnosisText(diagnosis, attitudes).c_str());
   if (!FLAGS_quiet && diagnosis.before) {
@@ -104,7 +108,7 @@ Command DiagnoseCommand() {
       "the closed loop: finds what the model lacks in frames that the fit has not seen, names the "
       "effect, adds it, and reports the error before and after, into diagnosis.yaml (and "
       "calibration.yaml with the effects, calibration_before.yaml without)";
-  command.flags = {"out", "significance"};
+  command.flags = {"out", "device", "significance"};
   for (const std::string& name : InputFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"require", "search_s", "quiet"});
   command.run = RunDiagnose;

@@ -141,6 +141,9 @@ def run(options, case):
                 # after correction for the number of candidates
                 result["least_p"] = min(1.0, len(rounds[0]["candidates"]) * min(
                     c["p_value"] for c in rounds[0]["candidates"]))
+                if case["kind"] == "clean":
+                    result["p_values"] = {c["name"]: c["p_value"]
+                                          for c in rounds[0]["candidates"]}
             result["added"] = [r["added"] for r in rounds if r["added"] != "none"]
             for r in rounds:
                 if r["added"] != "none":
@@ -320,6 +323,24 @@ def write_clean(out, results):
             " unexplained structure" if r["unexplained"] else ""))
     if wrong or failed:
         out.write("\n")
+    write_p_values(out, [r["p_values"] for r in results if "p_values" in r])
+
+
+def write_p_values(out, recordings):
+    """How often each candidate's own p-value is small where nothing is wrong."""
+    names = sorted({name for p_values in recordings for name in p_values})
+    if not names:
+        return
+    out.write("Share of recordings in which the p-value of a candidate, not corrected for their "
+              "number, is below 0.5, 0.1, 0.05 and 0.01. (frame_stamp_jitter cannot be negative: "
+              "where no spread is likelier than any, its p is 1.)\n\n"
+              "| Candidate | Recordings | < 0.5 | < 0.1 | < 0.05 | < 0.01 |\n"
+              "| --- | --- | --- | --- | --- | --- |\n")
+    for name in names:
+        p = np.array([p_values[name] for p_values in recordings if name in p_values])
+        out.write("| %s | %d | %s |\n" % (name, len(p), " | ".join(
+            "%.3f" % np.mean(p < limit) for limit in (0.5, 0.1, 0.05, 0.01))))
+    out.write("\n")
 
 
 def write(options, results):

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "frontend/readers/read_recording.h"
+#include "pipeline/frame_times_file.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/result_files.h"
 #include "tools/commands.h"
@@ -81,6 +82,7 @@ Status RunExport(const std::vector<std::string>& arguments) {
   if (!FLAGS_recording.empty()) {
     Result<Recording> recording = ReadRecording(FLAGS_recording);
     if (!recording) return tl::unexpected(recording.error());
+    if (const Status read = ApplyFrameTimes(arguments[0], &*recording); !read) return read;
     const CameraGuess& camera = recording->camera;
     if (camera.width_px > 0 &&
         (camera.width_px != calibration->width_px || camera.height_px != calibration->height_px)) {

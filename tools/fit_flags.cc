@@ -2,25 +2,38 @@
 
 #include <gflags/gflags.h>
 
-DEFINE_string(residual, "plane",
-              "image residual of window and refinement: plane, determinant as in the paper, or "
-              "transfer, of the rotation alone, for scenes without parallax");
+namespace {
+
+// A flag keeps the address of its help.
+const char* ResidualHelp() {
+  static const std::string help =
+      "image residual of window and refinement: " + camgyro::HelpOfResiduals();
+  return help.c_str();
+}
+
+}  // namespace
+
+DEFINE_string(residual, "plane", ResidualHelp());
+DEFINE_string(
+    device, "phone",
+    "what the camera and the gyro are: phone, action or industrial; it says how large the "
+    "effects are that nobody has declared, for the error in all");
 DEFINE_bool(robust, true, "no robust loss in window and refinement: plain least squares");
 
 namespace camgyro {
 
 std::vector<std::string> FitFlags() { return {"residual", "robust"}; }
 
+Result<DeviceClass> DeviceFromFlag() {
+  Result<DeviceClass> device = DeviceClassOf(FLAGS_device);
+  if (!device) return BadUsage("--device=" + FLAGS_device + ": " + device.error().message);
+  return device;
+}
+
 Status ReadFitFlags(PairGraphOptions* options) {
-  if (FLAGS_residual == "plane") {
-    options->residual = ResidualKind::kPlane;
-  } else if (FLAGS_residual == "determinant") {
-    options->residual = ResidualKind::kDeterminant;
-  } else if (FLAGS_residual == "transfer") {
-    options->residual = ResidualKind::kSymmetricTransfer;
-  } else {
-    return BadUsage("--residual=" + FLAGS_residual + ": expected plane, determinant or transfer");
-  }
+  const Result<const PairResidual*> residual = FindResidual(FLAGS_residual);
+  if (!residual) return tl::unexpected(residual.error());
+  options->residual = *residual;
   if (!FLAGS_robust) options->robust_threshold = 0.0;
   return {};
 }

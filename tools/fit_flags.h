@@ -6,12 +6,16 @@
 #include <vector>
 
 #include "core/result.h"
-#include "estimator/window/pair_graph.h"
+#include "estimator/diagnosis/device_class.h"
+#include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
 
 // Names of the flags that ReadFitFlags obeys.
 std::vector<std::string> FitFlags();
+
+// --device. Errors: kBadUsage.
+Result<DeviceClass> DeviceFromFlag();
 
 Status ReadFitFlags(PairGraphOptions* options);
 

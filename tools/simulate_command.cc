@@ -4,9 +4,9 @@
 
 #include <cstdio>
 
+#include "simulation/simulate.h"
+#include "simulation/write_recording.h"
 #include "tools/commands.h"
-#include "tools/simulation/simulate.h"
-#include "tools/simulation/write_recording.h"
 
 DECLARE_string(out);
 

@@ -8,6 +8,7 @@
 
 #include "core/format.h"
 #include "frontend/readers/read_recording.h"
+#include "pipeline/frame_times_file.h"
 #include "pipeline/read_calibration.h"
 #include "tools/commands.h"
 #include "tools/progress_bar.h"
@@ -105,8 +106,9 @@ Status RunStabilize(const std::vector<std::string>& arguments) {
   if (!calibration) return tl::unexpected(calibration.error());
   const Result<ReadOptions> reading = ReadOptionsFromFlags();
   if (!reading) return tl::unexpected(reading.error());
-  const Result<Recording> recording = ReadRecording(arguments[0], *reading);
+  Result<Recording> recording = ReadRecording(arguments[0], *reading);
   if (!recording) return tl::unexpected(recording.error());
+  if (const Status read = ApplyFrameTimes(FLAGS_calibration, &*recording); !read) return read;
   std::error_code error;
   if (fs::exists(out, error) && !recording->video_file.empty() &&
       fs::equivalent(out, recording->video_file, error)) {

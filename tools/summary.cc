@@ -16,8 +16,11 @@ constexpr size_t kWidth = 96;
 
 std::string TableRow(const ParameterRow& row) {
   const int decimals = DecimalsFor(row.sigma);
+  const std::string total =
+      row.sigma_total ? Format("± %-9.*f ", decimals, *row.sigma_total) : std::string();
   return Format("  %-22s %12.*f ± %-9.*f ", row.name.c_str(), decimals, row.value, decimals,
                 row.sigma) +
+         total +
          (row.determined ? row.unit
                          : Format("%-6s not determined by this recording", row.unit.c_str())) +
          "\n";
@@ -53,11 +56,34 @@ std::string EffectRows(const Calibration& c) {
 std::string ParameterTable(const Calibration& c, bool attitudes) {
   const Eigen::Matrix3d permutation = MountingPermutation(c);
   std::string table;
+  if (c.total_covariance) {
+    table += Format("  %-22s %12s %-13s %s\n", "", "value", "  ± noise", "± in all");
+  }
   for (const ParameterRow& row : ParameterRows(c, permutation, attitudes)) table += TableRow(row);
   return table + EffectRows(c) +
          "  (t_gyro = t_camera + delay; the mounting is what is left, about the camera's\n"
          "  axes, after " +
          DescribePermutation(permutation) + ")\n";
+}
+
+std::string SystematicLine(const CalibrationReport& report) {
+  const auto total = report.calibration.sigma_total();
+  if (!total) return "";
+  const StateVector noise = report.calibration.sigma();
+  std::string line;
+  for (const int i : {kStateFocal, kStateReadout, kStateDelay}) {
+    const auto largest = std::max_element(
+        report.systematic.begin(), report.systematic.end(),
+        [i](const EffectShare& a, const EffectShare& b) { return a.sigma[i] < b.sigma[i]; });
+    if (largest == report.systematic.end() || !(largest->sigma[i] > noise[i])) continue;
+    const StateParameter& p = StateTable()[static_cast<size_t>(i)];
+    const double sigma = p.unit_scale * largest->sigma[i];
+    line += Format("%s%s %s %.*f of %.*f %s", line.empty() ? "" : "; ", p.label,
+                   largest->effect.c_str(), DecimalsFor(sigma), sigma, DecimalsFor(sigma),
+                   p.unit_scale * (*total)[i], p.unit);
+  }
+  const std::string device = "of a usual device (--device=" + report.device_class + ")";
+  return Notes("in all", {device + (line.empty() ? ", mostly noise" : ", mostly: " + line)});
 }
 
 std::string MotionLine(const Recording& recording, const TrackingSummary& tracking) {

@@ -14,6 +14,9 @@ namespace camgyro {
 // Each parameter with value, sigma, unit, and whether this motion determined it.
 std::string ParameterTable(const Calibration& calibration, bool attitudes);
 
+// What the error in all is made of beside noise, by parameter; empty where it is not known.
+std::string SystematicLine(const CalibrationReport& report);
+
 // Matches, their motion, outliers.
 std::string MotionLine(const Recording& recording, const TrackingSummary& tracking);
 

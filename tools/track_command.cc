@@ -67,6 +67,7 @@ Status RunTrack(const std::vector<std::string>& arguments) {
         [&](double done) { bar.Show("tracking", done); }, &*recording);
   }
   if (!summary) return tl::unexpected(summary.error());
+  if (Status strict = CheckStrict(*recording); !strict) return strict;
   files.Add("cam0/tracks.csv", TracksCsv(*recording));
   if (Status written = files.Write(); !written) return written;
   if (FLAGS_quiet) return {};

@@ -114,7 +114,10 @@ struct EffectSetup {
   Eigen::Matrix3Xd accel_m_s2;            // specific force in the gyro frame, one column per time
   double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
   double clock_skew = 0.0;                // that the start has found [s/s]; 0: none
-  std::vector<double> frame_delays_s;     // of each frame with the effects on time; empty: delay_s
+  // Standard deviation of the frames' stamps around a clock where they are times of arrival [s]; 0:
+  // they are not, or nobody has looked.
+  double frame_stamp_jitter_s = 0.0;
+  std::vector<double> frame_delays_s;  // of each frame with the effects on time; empty: delay_s
   Eigen::Matrix3d R_gyro_cam = Eigen::Matrix3d::Identity();
   bool has_pixels = true;                                     // false: attitudes
   DistortionModel distortion_model = DistortionModel::kNone;  // declared

@@ -15,7 +15,7 @@ class FrameStampJitter final : public Effect {
 }  // namespace
 
 EffectEntry FrameStampJitterEntry() {
-  return WithOneShape<FrameStampJitter>(
+  EffectEntry entry = WithOneShape<FrameStampJitter>(
       {"frame_stamp_jitter",
        ModelPart::kShutterClock,
        "the frames' stamps scatter around the times at which they were taken, each by an amount of "
@@ -25,6 +25,11 @@ EffectEntry FrameStampJitterEntry() {
        {},
        {}},
       "spread", AlwaysShown);
+  // An attitude says too little of its own time.
+  entry.found_at_start = [](const EffectSetup& setup) {
+    return setup.has_pixels && setup.frame_stamp_jitter_s > 0.0;
+  };
+  return entry;
 }
 
 }  // namespace camgyro

@@ -22,13 +22,14 @@ struct Gaps {
   double longest_s = 0.0, longest_at_s = 0.0;
 };
 
-template <typename Stamped>
-Gaps FindGaps(const std::vector<Stamped>& items, int64_t origin_ns) {
+// known(i): the gap before item i is one of our making.
+template <typename Stamped, typename Known>
+Gaps FindGaps(const std::vector<Stamped>& items, int64_t origin_ns, const Known& known) {
   Gaps gaps;
   const double interval = MedianInterval(items);
   for (size_t i = 1; i < items.size(); ++i) {
     const double step = SecondsSince(items[i - 1].stamp_ns, items[i].stamp_ns);
-    if (step < 1.5 * interval) continue;
+    if (step < 1.5 * interval || known(i)) continue;
     ++gaps.count;
     gaps.missing += static_cast<int>(std::lround(step / interval)) - 1;
     if (step > gaps.longest_s) {
@@ -45,7 +46,13 @@ double PairMotion(const FramePair& pair) {
   return motion.empty() ? 0.0 : MedianInPlace(&motion);
 }
 
-// Frames that show the picture of the frame before, while the camera moves before and after.
+// Motion of a repeated picture over that of the pictures around it: tracking noise and coding only.
+constexpr double kRepeatedMotion = 0.02;
+constexpr double kMovingPx = 1.0;      // between the pictures around
+constexpr size_t kFewestRepeated = 8;  // matches that show it
+
+// Frames that show the picture of the frame before, one or several in a row, while the camera moves
+// before and after.
 std::vector<int> RepeatedPictures(const Recording& recording) {
   std::vector<FramePair> pairs =
       recording.matches.empty() ? PairsFromTracks(recording.tracks, 1) : recording.matches;
@@ -55,10 +62,16 @@ std::vector<int> RepeatedPictures(const Recording& recording) {
   for (const FramePair& pair : pairs) motion.push_back(PairMotion(pair));
   std::vector<int> repeated;
   for (size_t i = 1; i + 1 < motion.size(); ++i) {
-    const bool around = std::min(motion[i - 1], motion[i + 1]) > 1.0;
-    if (around && pairs[i].matches.size() >= 8 &&
-        motion[i] < 0.02 * std::min(motion[i - 1], motion[i + 1])) {
-      repeated.push_back(pairs[i].frame_b);
+    if (!(motion[i - 1] > kMovingPx)) continue;
+    const double still_px = kRepeatedMotion * motion[i - 1];
+    size_t end = i;  // of the pairs that do not move
+    while (end < motion.size() && pairs[end].matches.size() >= kFewestRepeated &&
+           motion[end] < still_px) {
+      ++end;
+    }
+    if (end == i || end == motion.size() || !(motion[end] > kMovingPx)) continue;
+    for (; i < end; ++i) {
+      if (motion[i] < kRepeatedMotion * motion[end]) repeated.push_back(pairs[i].frame_b);
     }
   }
   return repeated;
@@ -101,7 +114,9 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
                              static_cast<long>(count), saturated.size(), rail, rail * 57.29578),
                       FindEffect("gyro_saturation")->advice, static_cast<int>(count)});
   }
-  const Gaps frames = FindGaps(recording.frames, origin_ns);
+  const Gaps frames = FindGaps(recording.frames, origin_ns, [&](size_t i) {
+    return recording.PictureOf(i) > recording.PictureOf(i - 1) + 1;  // left out
+  });
   if (frames.count > 0) {
     faults.push_back(
         {"dropped_frames",
@@ -110,7 +125,7 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
                 frames.count, frames.missing, 1e3 * frames.longest_s, frames.longest_at_s),
          "harmless if the stamps are right: check for a delay_step at these times", frames.count});
   }
-  const Gaps samples = FindGaps(recording.gyro, origin_ns);
+  const Gaps samples = FindGaps(recording.gyro, origin_ns, [](size_t) { return false; });
   if (samples.longest_s > LongestGyroStep(MedianInterval(recording.gyro))) {
     faults.push_back({"dropped_samples",
                       Format("%d gaps in the gyro's stamps, the longest of %.0f ms at %.2f s",
@@ -139,31 +154,7 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
 int DropRepeatedPictures(Recording* recording) {
   const std::vector<int> repeated = RepeatedPictures(*recording);
   if (repeated.empty() || 2 * repeated.size() > recording->frames.size()) return 0;
-  std::vector<int> moved(recording->frames.size());  // new index; of a repeat, its original's
-  size_t kept = 0, next = 0;
-  for (size_t i = 0; i < moved.size(); ++i) {
-    if (next < repeated.size() && repeated[next] == static_cast<int>(i)) {
-      ++next;
-      moved[i] = static_cast<int>(kept) - 1;
-      continue;
-    }
-    moved[i] = static_cast<int>(kept);
-    recording->frames[kept] = recording->frames[i];
-    if (!recording->tracks.empty()) recording->tracks[kept].swap(recording->tracks[i]);
-    if (!recording->q_cam_world.empty()) recording->q_cam_world[kept] = recording->q_cam_world[i];
-    ++kept;
-  }
-  recording->frames.resize(kept);
-  if (!recording->tracks.empty()) recording->tracks.resize(kept);
-  if (!recording->q_cam_world.empty()) recording->q_cam_world.resize(kept);
-  std::vector<FramePair> pairs;
-  for (FramePair& pair : recording->matches) {
-    pair.frame_a = moved[static_cast<size_t>(pair.frame_a)];
-    pair.frame_b = moved[static_cast<size_t>(pair.frame_b)];
-    if (pair.frame_a < pair.frame_b) pairs.push_back(std::move(pair));
-  }
-  recording->matches = std::move(pairs);
-  recording->video_file.clear();
+  LeaveOutFrames(repeated, /*repeats=*/true, recording);
   const int count = static_cast<int>(repeated.size());
   const std::string finding =
       Format("%d frames repeat the picture before them while the camera moves; left out", count);

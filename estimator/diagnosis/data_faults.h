@@ -24,10 +24,10 @@ struct DataFault {
 // is not what the file declares.
 std::vector<DataFault> FindDataFaults(const Recording& recording);
 
-// Leaves out frames that repeat the picture before them while the camera moves: their stamps belong
-// to another picture. For tracks without identity across such a frame nothing is lost. Records the
-// fault and returns how many; a recording with repeats in more than half of the places stays as it
-// is. After it, frames do not number the pictures of video_file any more, which is therefore unset.
+// Leaves out frames that repeat the picture before them, one or several in a row, while the camera
+// moves: their stamps belong to another picture. For tracks without identity across such a frame
+// nothing is lost. Records the fault and returns how many; a recording with repeats in more than
+// half of the places stays as it is.
 int DropRepeatedPictures(Recording* recording);
 
 // Is the picture without the fast rotation that the gyro has? Compares the power of the rates below

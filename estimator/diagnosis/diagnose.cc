@@ -33,12 +33,21 @@ void AddUnique(const std::string& name, std::vector<std::string>* names) {
   if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
 }
 
-// Effects that are in the model from the start on, as findings.
+// Beyond noise in the fit of all frames.
+bool IsSeen(const EffectSet::Item& item, const Calibration& c) {
+  const auto n = item.effect->size();
+  const Eigen::VectorXd sigma =
+      c.effect_covariance.diagonal().segment(item.first, n).cwiseMax(0.0).cwiseSqrt();
+  return (c.effect_values.segment(item.first, n).cwiseAbs().array() > kSeenSigmas * sigma.array())
+      .any();
+}
+
+// Effects that are in the model from the start on, as findings, where the fit sees them, too.
 void AddFoundAtStart(const CalibrationReport& report, Diagnosis* diagnosis) {
   const Calibration& c = report.calibration;
   if (c.effects == nullptr) return;
   for (const EffectSet::Item& item : c.effects->items()) {
-    if (!item.entry->found_at_start) continue;
+    if (!item.entry->found_at_start || !IsSeen(item, c)) continue;
     diagnosis->faults.push_back(
         {item.entry->name, "found at the start: " + item.entry->explanation, item.entry->advice});
     AddUnique(item.entry->name, &diagnosis->effects);
@@ -132,8 +141,8 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocal& rotations_
   input.fit = report.calibration;
   input.start = input.prior.mean;
   input.start.bias_gyro_rad_s = report.start.bias_gyro_rad_s;
-  if (const Status added =
-          AddStartEffects(recording, report.start, options.calibrate.effects, &input.start);
+  if (const Status added = AddStartEffects(recording, report.start, options.calibrate.effects,
+                                           *report.residual, &input.start);
       !added) {
     diagnosis.not_tested = added.error().message;
     return diagnosis;

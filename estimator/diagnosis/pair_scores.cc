@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
-#include "factors/coplanarity_plane.h"
-#include "factors/relative_rotation.h"
 #include "factors/rotation_manifold.h"
 
 namespace camgyro {
@@ -125,114 +124,108 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   pair->latent_gain = two_log(wide) - two_log(s.prior);
 }
 
-bool PixelSystem(const EstimationInput& input, const TimedPair& pair, const Calibration& c,
-                 const AllEffects& all, double noise, const PairGraphOptions& options,
-                 PairSystem* s) {
+// A pair's factor with all effects, linearised where the calibration puts it.
+struct LinearPair {
   PairView view;
-  if (!ViewPair(input, pair, c, noise, options, &view) ||
+  PairPlane plane;  // of residuals that have a direction
+  std::vector<BlockKind> blocks;
+  Evaluated factor;
+
+  // By the only block of a kind.
+  const RowMajor& J(BlockKind kind) const {
+    return factor
+        .J[static_cast<size_t>(std::find(blocks.begin(), blocks.end(), kind) - blocks.begin())];
+  }
+};
+
+// False where the gyro does not cover the pair, or it has too few matches or no value.
+bool LinearizePair(const PairResidual& residual, const EstimationInput& input,
+                   const TimedPair& pair, const Calibration& c, const AllEffects& all, double noise,
+                   const PairGraphOptions& options, LinearPair* linear) {
+  PairView& view = linear->view;
+  if (!ViewPair(input, pair, c, noise, options, &view)) return false;
+  if (!residual.facts().of_attitudes &&
       static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches) {
     return false;
   }
-  const PairPlane plane = FitPlane(view);
+  if (residual.facts().has_direction) linear->plane = FitPlane(view);
   auto measurement = std::make_shared<PairMeasurement>(view.measurement);
   measurement->effects = all.set->size() > 0 ? all.set : nullptr;
-  const CoplanarityPlane cost(measurement);
   const ShutterParameters shutter = ShutterOf(c);
-  std::vector<const double*> parameters = {c.lens.data(), shutter.data(),
-                                           c.q_gyro_cam.coeffs().data(), plane.tau.data(),
-                                           plane.bend.data()};
-  if (measurement->effects) parameters.push_back(all.values.data());
-  parameters.push_back(view.rates.data());
-  const Evaluated e = Evaluate(cost, parameters);
-  if (e.r.size() == 0) return false;
+  PairParameters at;
+  at.lens = c.lens.data();
+  at.shutter = shutter.data();
+  at.q_gyro_cam = c.q_gyro_cam.coeffs().data();
+  at.tau = linear->plane.tau.data();
+  at.bend = linear->plane.bend.data();
+  at.effects = all.values.data();
+  at.rates = {view.rates.data()};
+  linear->blocks = residual.Blocks(*measurement);
+  linear->factor = Evaluate(*residual.MakeCost(measurement, pair.id), at.InOrder(linear->blocks));
+  return linear->factor.r.size() > 0;
+}
 
-  const RowMajor& by_rates = e.J.back();
+// What state and effects change.
+void FillShared(const LinearPair& linear, const Calibration& c, const AllEffects& all,
+                PairSystem* s) {
+  const bool with_effects = all.set->size() > 0;
   const Eigen::MatrixXd through_rates =
-      by_rates * RateColumnsOf(all, measurement->rate_times_s, view.rates);
-  s->r = e.r;
-  s->J.resize(e.r.size(), kStateSize + all.set->size());
-  s->J.middleCols<3>(kStateFocal) = e.J[0].leftCols<3>();
-  s->J.col(kStateReadout) = e.J[1].col(kReadout);
-  s->J.col(kStateDelay) = e.J[1].col(kDelay);
+      linear.J(BlockKind::kRates) *
+      RateColumnsOf(all, linear.view.measurement.rate_times_s, linear.view.rates);
+  s->r = linear.factor.r;
+  s->J.setZero(s->r.size(), kStateSize + all.set->size());
+  if (std::count(linear.blocks.begin(), linear.blocks.end(), BlockKind::kLens) > 0) {
+    s->J.middleCols<3>(kStateFocal) = linear.J(BlockKind::kLens).leftCols<3>();
+  }
+  s->J.col(kStateReadout) = linear.J(BlockKind::kShutter).col(kReadout);
+  s->J.col(kStateDelay) = linear.J(BlockKind::kShutter).col(kDelay);
   s->J.middleCols<3>(kStateBias) = -through_rates.leftCols<3>();
   RotationManifold manifold;
   Eigen::Matrix<double, 4, 3, Eigen::RowMajor> plus;
   manifold.PlusJacobian(c.q_gyro_cam.coeffs().data(), plus.data());
-  s->J.middleCols<3>(kStateRotation) = e.J[2] * plus;
+  s->J.middleCols<3>(kStateRotation) = linear.J(BlockKind::kRotation) * plus;
   s->J.rightCols(all.set->size()) = -through_rates.rightCols(all.set->size());
-  if (measurement->effects) s->J.rightCols(all.set->size()) += e.J[CoplanarityPlane::kEffectsBlock];
+  if (with_effects) s->J.rightCols(all.set->size()) += linear.J(BlockKind::kEffects);
+}
 
-  const Eigen::Vector3d u = plane.tau.unitOrthogonal(), v = plane.tau.cross(u);
-  // The noise of the rates as PairGraph has it: its means over some samples.
-  const Eigen::Index samples = view.rates.cols();
-  const double interval_s =
-      (measurement->rate_times_s.back() - measurement->rate_times_s.front()) / (samples - 1.0);
-  const Eigen::Index step = options.RateStep(interval_s, c.lens[kFocal]);
+// What is the pair's own: direction, bend, and noise of the rates as PairGraph has it, its means
+// over some samples (of attitudes: each).
+void FillOwn(const PairResidual& residual, const LinearPair& linear, const TimedPair& pair,
+             const Calibration& c, const AllEffects& all, const PairGraphOptions& options,
+             PairSystem* s) {
+  const PairMeasurement& m = linear.view.measurement;
+  const RowMajor& by_rates = linear.J(BlockKind::kRates);
+  const Eigen::Index samples = linear.view.rates.cols();
+  const double interval_s = (m.rate_times_s.back() - m.rate_times_s.front()) / (samples - 1.0);
+  const Eigen::Index step =
+      residual.facts().of_attitudes ? 1 : options.RateStep(interval_s, c.lens[kFocal]);
   const Eigen::Index values = (samples + step - 1) / step;
-  s->N.setZero(e.r.size(), 8 + 3 * values);
-  s->N.col(0) = e.J[CoplanarityPlane::kTauBlock] * u;
-  s->N.col(1) = e.J[CoplanarityPlane::kTauBlock] * v;
-  s->N.middleCols<6>(2) = e.J[CoplanarityPlane::kBendBlock];
-  Eigen::VectorXd rate_prior(3 * values);
+  const Eigen::Index own = residual.facts().has_direction ? 8 : 0;
+  s->N.setZero(s->r.size(), own + 3 * values);
+  s->prior.setZero(s->N.cols());
+  s->at.setZero(s->N.cols());
+  if (own > 0) {
+    const Eigen::Vector3d u = linear.plane.tau.unitOrthogonal(), v = linear.plane.tau.cross(u);
+    s->N.col(0) = linear.J(BlockKind::kDirection) * u;
+    s->N.col(1) = linear.J(BlockKind::kDirection) * v;
+    s->N.middleCols<6>(2) = linear.J(BlockKind::kBend);
+    s->prior.segment<6>(2) = linear.view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
+    s->at.segment<6>(2) = linear.plane.bend;
+  }
   for (Eigen::Index k = 0; k < values; ++k) {
     const Eigen::Index count = std::min(step, samples - k * step);
     for (Eigen::Index i = k * step; i < k * step + count; ++i) {
-      s->N.middleCols<3>(8 + 3 * k) += by_rates.middleCols<3>(3 * i);
+      s->N.middleCols<3>(own + 3 * k) += by_rates.middleCols<3>(3 * i);
     }
-    rate_prior.segment<3>(3 * k) =
+    s->prior.segment<3>(own + 3 * k) =
         static_cast<double>(count) * options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse();
   }
-  s->prior.setZero(s->N.cols());
-  s->prior.segment<6>(2) = view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
-  s->prior.tail(3 * values) = rate_prior;
-  s->at = Eigen::VectorXd::Zero(s->N.cols());
-  s->at.segment<6>(2) = plane.bend;
-  if (all.free_turn_rad_s > 0.0) {
+  if (own > 0 && all.free_turn_rad_s > 0.0) {
     s->bend_column = 2;
     s->free_bend = BendSigma(all.free_turn_rad_s, c.readout_s, pair.time_b_s - pair.time_a_s)
                        .cwiseAbs2()
                        .cwiseInverse();
   }
-  return true;
-}
-
-bool RotationSystem(const EstimationInput& input, const TimedPair& pair, const Calibration& c,
-                    const AllEffects& all, double noise, const PairGraphOptions& options,
-                    PairSystem* s) {
-  auto m = std::make_shared<RelativeRotation::Measurement>();
-  Eigen::Matrix3Xd rates;
-  if (!RatesOfPair(input, pair, c, &m->rate_times_s, &rates)) return false;
-  m->rate_group_sizes = {static_cast<int>(rates.cols())};
-  m->q_a_b = pair.rotation.q_a_b;
-  m->frame_a = pair.first();
-  m->frame_b = pair.second();
-  m->sigma_rad = noise;
-  m->robust_threshold = options.robust_threshold;
-  m->effects = all.set->size() > 0 ? all.set : nullptr;
-  const RelativeRotation cost(m);
-  const ShutterParameters shutter = ShutterOf(c);
-  std::vector<const double*> parameters = {shutter.data(), c.q_gyro_cam.coeffs().data()};
-  if (m->effects) parameters.push_back(all.values.data());
-  parameters.push_back(rates.data());
-  const Evaluated e = Evaluate(cost, parameters);
-  if (e.r.size() == 0) return false;
-  const RowMajor& by_rates = e.J.back();
-  const Eigen::MatrixXd through_rates = by_rates * RateColumnsOf(all, m->rate_times_s, rates);
-  s->r = e.r;
-  s->J.setZero(3, kStateSize + all.set->size());
-  s->J.col(kStateDelay) = e.J[0].col(kDelay);
-  s->J.middleCols<3>(kStateBias) = -through_rates.leftCols<3>();
-  RotationManifold manifold;
-  Eigen::Matrix<double, 4, 3, Eigen::RowMajor> plus;
-  manifold.PlusJacobian(c.q_gyro_cam.coeffs().data(), plus.data());
-  s->J.middleCols<3>(kStateRotation) = e.J[1] * plus;
-  s->J.rightCols(all.set->size()) = -through_rates.rightCols(all.set->size());
-  if (m->effects) s->J.rightCols(all.set->size()) += e.J[RelativeRotation::kEffectsBlock];
-  s->N = by_rates;
-  s->prior = options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse().replicate(rates.cols(), 1);
-  s->at = Eigen::VectorXd::Zero(s->N.cols());
-  s->bend_column = -1;
-  return true;
 }
 
 }  // namespace
@@ -250,18 +243,21 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
     sum.H.setZero(size, size);
     if (!block.empty()) sum.time_s = 0.5 * (block.front().time_a_s + block.back().time_b_s);
     for (const TimedPair& pair : block) {
-      const bool rotation = pair.matches.empty() && pair.rotation.frame_b > pair.rotation.frame_a;
-      PairSystem system;
-      if (!(rotation ? RotationSystem(input, pair, calibration, all, noise, options, &system)
-                     : PixelSystem(input, pair, calibration, all, noise, options, &system))) {
+      const PairResidual& residual = ResidualOf(pair, options);
+      LinearPair linear;
+      if (!LinearizePair(residual, input, pair, calibration, all, noise, options, &linear)) {
         continue;
       }
+      PairSystem system;
+      FillShared(linear, calibration, all, &system);
+      FillOwn(residual, linear, pair, calibration, all, options, &system);
       PairScore score;
       score.frame_b = pair.frame_b;
       score.time_s = pair.time_b_s;
       score.block = static_cast<int>(scores.blocks.size());
       // The direction takes two; the bend none, since chi2 has the penalty of its prior.
-      score.residuals = static_cast<int>(system.r.size()) - (rotation ? 0 : 2);
+      score.residuals =
+          static_cast<int>(system.r.size()) - (residual.facts().has_direction ? 2 : 0);
       ProjectInto(system, scores.num_model, &score, &sum);
       scores.pairs.push_back(std::move(score));
     }

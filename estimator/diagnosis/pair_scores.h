@@ -11,7 +11,8 @@
 #include "core/calibration.h"
 #include "core/effects/catalogue.h"
 #include "estimator/diagnosis/shares.h"
-#include "estimator/window/pair_graph.h"
+#include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <unsupported/Eigen/SpecialFunctions>
+#include <utility>
 
 #include "estimator/diagnosis/thresholds.h"
 
@@ -71,6 +72,7 @@ class Solver {
 struct Effective {
   Eigen::VectorXd s;
   Eigen::MatrixXd M;
+  Eigen::MatrixXd X;  // model x columns
   Eigen::VectorXd estimate;
   std::vector<Eigen::VectorXd> rest;   // scores that the fitted columns leave, by block
   std::vector<Eigen::VectorXd> pairs;  // scores by pair
@@ -84,9 +86,10 @@ Effective Project(const Scores& scores, const std::vector<int>& columns,
   H_mm.diagonal() += Pick(prior_information, model);
   const Solver model_solver(H_mm);
   const Eigen::MatrixXd H_mc = Pick(sum.H, model, columns);
-  const Eigen::MatrixXd X = model_solver.Solve(H_mc);  // model x columns
-  const Eigen::VectorXd g_m = Pick(sum.g, model);
   Effective e;
+  e.X = model_solver.Solve(H_mc);
+  const Eigen::MatrixXd& X = e.X;
+  const Eigen::VectorXd g_m = Pick(sum.g, model);
   e.s = Pick(sum.g, columns) - X.transpose() * g_m;
   e.M = Pick(sum.H, columns, columns) - H_mc.transpose() * X;
   e.M = 0.5 * (e.M + e.M.transpose()).eval();
@@ -221,6 +224,12 @@ ScoreTest TestColumns(const Scores& scores, const std::vector<int>& columns,
   if (scores.blocks.size() < kLeastBlocks) return {};
   return Judge(Project(scores, columns, prior_information), Pick(prior_information, columns),
                usual);
+}
+
+Projection ProjectModelOut(const Scores& scores, const std::vector<int>& columns,
+                           const Eigen::VectorXd& prior_information) {
+  Effective e = Project(scores, columns, prior_information);
+  return {std::move(e.s), std::move(e.M), std::move(e.X)};
 }
 
 Scatter UsualScatter(const std::vector<ScoreTest>& tests) {

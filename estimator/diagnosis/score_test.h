@@ -46,6 +46,16 @@ ScoreTest TestColumns(const Scores& scores, const std::vector<int>& columns,
 // degrees of freedom allow are worth less). dof is at most 50, since the tests are not independent.
 Scatter UsualScatter(const std::vector<ScoreTest>& tests);
 
+// What some columns, left out of the model, do to its fit.
+struct Projection {
+  Eigen::VectorXd score;        // of the columns, the model's projected out
+  Eigen::MatrixXd information;  // the same
+  // Model x columns: how far a fit without the columns is off, by each column's true value.
+  Eigen::MatrixXd shift;
+};
+Projection ProjectModelOut(const Scores& scores, const std::vector<int>& columns,
+                           const Eigen::VectorXd& prior_information);
+
 // Change of all columns by one Gauss-Newton step with some columns free beside the model's; the
 // others stay zero.
 Eigen::VectorXd StepOf(const Scores& scores, const std::vector<int>& columns,

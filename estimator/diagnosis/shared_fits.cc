@@ -17,22 +17,10 @@ SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
       shares_(MakeShares(*in.recording, input_)) {
   const PairSelection near = SelectPairs(*in.recording, kNearGap);
   map_pairs_ = MakeShares(*in.recording, MakeEstimationInput(*in.recording, near)).choice;
+  if (in.recording->HasOnlyAttitudes()) return;
   Thin(kMostFitPairs, &shares_.fit);
   Thin(kMostChoicePairs, &shares_.choice);
   Thin(kMostChoicePairs, &map_pairs_);
-}
-
-void SharedFits::Thin(size_t most, std::vector<PairBlock>* blocks) const {
-  const size_t stride = (Joined(*blocks).size() + most - 1) / most;
-  if (stride < 2 || in_.recording->HasOnlyAttitudes()) return;
-  size_t at = 0;
-  for (PairBlock& block : *blocks) {
-    PairBlock kept;
-    for (TimedPair& pair : block) {
-      if (at++ % stride == 0) kept.push_back(std::move(pair));
-    }
-    block = std::move(kept);
-  }
 }
 
 std::vector<PairBlock> SharedFits::SeenBlocks() const {
@@ -50,8 +38,7 @@ std::vector<PairBlock> SharedFits::SeenBlocks() const {
 Result<Refined> SharedFits::Fit(const Calibration& start, double noise) const {
   RefinementOptions refinement = options_.calibrate.refinement;
   refinement.graph = in_.graph;
-  refinement.graph.sigma_px = noise;
-  refinement.sigma_rad = noise;
+  refinement.graph.sigma = noise;
   refinement.cluster_s = shares_.block_s;
   refinement.max_rounds = kFitRounds;
   return Refine(input_, Joined(shares_.fit), start, in_.prior, refinement);

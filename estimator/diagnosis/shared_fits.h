@@ -41,9 +41,6 @@ class SharedFits {
   bool HasRunAway(const Calibration& calibration) const;
 
  private:
-  // Leaves every n-th pair, so that at most `most` stay.
-  void Thin(size_t most, std::vector<PairBlock>* blocks) const;
-
   const LoopInput& in_;
   const DiagnoseOptions& options_;
   const EstimationInput input_;

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include "core/time.h"
 #include "estimator/diagnosis/thresholds.h"
+#include "estimator/window/pair_graph.h"
 
 namespace camgyro {
 namespace {
@@ -86,6 +88,19 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input) {
     shares.report_shares_tracks = true;
   }
   return shares;
+}
+
+void Thin(size_t most, std::vector<PairBlock>* blocks) {
+  const size_t stride = (Joined(*blocks).size() + most - 1) / most;
+  if (stride < 2) return;
+  size_t at = 0;
+  for (PairBlock& block : *blocks) {
+    PairBlock kept;
+    for (TimedPair& pair : block) {
+      if (at++ % stride == 0) kept.push_back(std::move(pair));
+    }
+    block = std::move(kept);
+  }
 }
 
 std::vector<TimedPair> Joined(const std::vector<PairBlock>& blocks) {

@@ -28,6 +28,9 @@ struct Shares {
 // 0.2 and 3 s, at least 6 frames.
 Shares MakeShares(const Recording& recording, const EstimationInput& input);
 
+// Leaves every n-th pair, so that at most `most` stay.
+void Thin(size_t most, std::vector<PairBlock>* blocks);
+
 std::vector<TimedPair> Joined(const std::vector<PairBlock>& blocks);
 
 }  // namespace camgyro

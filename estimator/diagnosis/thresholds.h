@@ -96,6 +96,9 @@ constexpr double kMisfitToScan = 2.0, kMisfitToScanP = 1e-3;
 
 // ---- What the verdict says beside effects ----
 
+// Sigmas beyond which the fit bears out an effect that the start has put into the model.
+constexpr double kSeenSigmas = 3.0;
+
 // Canonical correlation of two effects beyond which this motion cannot tell them apart, and how
 // many more parameters one may have: a flexible curve contains simpler effects (candidates.cc).
 constexpr double kAliasLimit = 0.95;

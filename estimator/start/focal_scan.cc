@@ -3,8 +3,10 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/robust_statistics.h"
 #include "core/time.h"
@@ -77,14 +79,171 @@ Eigen::MatrixXd FitParabola(const Eigen::VectorXd& x, const Eigen::MatrixXd& y) 
   return powers.colPivHouseholderQr().solve(y);
 }
 
+// The scan over focal lengths, step by step.
+class FocalScan {
+ public:
+  FocalScan(const Recording& recording, const CameraRotationsAtFocal& rotations_at,
+            const StartOptions& options, const FocalScanOptions& scan_options)
+      : recording_(recording),
+        rotations_at_(rotations_at),
+        options_(options),
+        log_guess_(std::log(FocalToBeginWith(recording.camera))),
+        spacing_(std::log(scan_options.max_focal / scan_options.min_focal) /
+                 (scan_options.points - 1)) {
+    const double side_px = std::max(recording.camera.width_px, recording.camera.height_px);
+    const double log_min = std::log(scan_options.min_focal * side_px);
+    points_.resize(static_cast<size_t>(scan_options.points));
+    for (size_t k = 0; k < points_.size(); ++k) {
+      points_[k].log_focal = log_min + spacing_ * static_cast<double>(k);
+      points_[k].rotations = rotations_at(std::exp(points_[k].log_focal));
+    }
+  }
+
+  // Delay and orientation, to which a wrong focal length is mostly a scale: from the points nearest
+  // to the guess outwards, the first that works.
+  Status FindNear() {
+    std::vector<size_t> order(points_.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+      return std::abs(points_[a].log_focal - log_guess_) <
+             std::abs(points_[b].log_focal - log_guess_);
+    });
+    StartOptions loose = options_;
+    loose.max_rate_ratio = kLooseRateRatio;
+    Status first_error = CannotEstimate("");
+    for (const size_t k : order) {
+      Result<StartResult> near = FindStart(recording_, points_[k].rotations, loose);
+      if (near) {
+        near_ = std::move(*near);
+        return {};
+      }
+      if (k == order.front()) first_error = tl::unexpected<Error>(near.error());
+    }
+    return first_error;
+  }
+
+  // The loss at every point, and at two points more around the best.
+  void Scan() {
+    for (ScanPoint& point : points_) MeasureAt(&point);
+    Truncate();
+    const double coarse = points_[BestPoint()].log_focal;
+    for (const double offset : {-0.5 * spacing_, 0.5 * spacing_}) {
+      ScanPoint point;
+      point.log_focal = coarse + offset;
+      point.rotations = rotations_at_(std::exp(point.log_focal));
+      MeasureAt(&point);
+      points_.push_back(std::move(point));
+    }
+    Truncate();
+    std::sort(points_.begin(), points_.end(),
+              [](const ScanPoint& x, const ScanPoint& y) { return x.log_focal < y.log_focal; });
+  }
+
+  // The focal length, by the parabola around the best point.
+  StartFocal Fit() const {
+    StartFocal focal;
+    const size_t best = BestPoint();
+    const double best_log = points_[best].log_focal, best_loss = points_[best].loss.sum();
+    double second_loss = -1.0;
+    std::vector<size_t> close;
+    for (size_t k = 0; k < points_.size(); ++k) {
+      const double loss = points_[k].loss.sum();
+      const double distance = std::abs(points_[k].log_focal - best_log);
+      focal.curve.push_back(
+          {std::exp(points_[k].log_focal), loss / (gyro_power_ * std::exp(2.0 * best_log))});
+      if (distance < 1.1 * spacing_) close.push_back(k);
+      if (distance > kDistinctLog && (second_loss < 0.0 || loss < second_loss)) second_loss = loss;
+    }
+    focal.runner_up_ratio = second_loss > 0.0 ? best_loss / second_loss : 1.0;
+    const bool inside = best > 0 && best + 1 < points_.size();
+    auto [log_focal, sigma_log] = Minimum(close, best_log, inside);
+    sigma_log = std::hypot(sigma_log, kModelLog);
+    focal.determined = sigma_log < kDeterminedLog && focal.runner_up_ratio < kMaxRunnerUp;
+    if (!focal.determined) {
+      log_focal = log_guess_;
+      sigma_log = kUnknownLog;
+    }
+    focal.value_px = std::exp(log_focal);
+    focal.sigma_px = sigma_log * focal.value_px;
+    return focal;
+  }
+
+ private:
+  void MeasureAt(ScanPoint* point) const {
+    // The inverse of what FindStart makes of a lag.
+    const double lag_s =
+        (near_.delay_middle_row_s -
+         SecondsSince(recording_.frames.front().stamp_ns, recording_.gyro.front().stamp_ns)) *
+        (1.0 + near_.clock_skew);
+    Measure(recording_, near_, lag_s, options_, point);
+  }
+
+  // Losses, bounded by the least noise of any point.
+  void Truncate() {
+    for (const ScanPoint& point : points_) {
+      if (point.squares.empty()) continue;
+      if (noise_px_s_ < 0.0 || point.noise_px_s < noise_px_s_) noise_px_s_ = point.noise_px_s;
+      pairs_ = std::max(pairs_, point.squares.size());
+      gyro_power_ = std::max(gyro_power_, point.gyro_power);
+    }
+    const double cap = 2.0 * std::pow(kTruncateSigmas * noise_px_s_, 2);
+    for (ScanPoint& point : points_) {
+      point.loss = Eigen::VectorXd::Zero(kBlocks);
+      for (size_t i = 0; i < point.squares.size(); ++i) {
+        point.loss[point.blocks[i]] += std::min(point.squares[i], cap);
+      }
+      // A pair that found no rotation at this focal length counts as an outlier.
+      point.loss.array() += cap * static_cast<double>(pairs_ - point.squares.size()) / kBlocks;
+    }
+  }
+
+  size_t BestPoint() const {
+    return static_cast<size_t>(std::min_element(points_.begin(), points_.end(),
+                                                [](const ScanPoint& x, const ScanPoint& y) {
+                                                  return x.loss.sum() < y.loss.sum();
+                                                }) -
+                               points_.begin());
+  }
+
+  // Of the parabola through some points: log of the focal length, and its standard deviation.
+  std::pair<double, double> Minimum(const std::vector<size_t>& close, double best_log,
+                                    bool inside) const {
+    Eigen::VectorXd x(static_cast<Eigen::Index>(close.size()));
+    Eigen::MatrixXd y(static_cast<Eigen::Index>(close.size()), kBlocks);
+    for (size_t k = 0; k < close.size(); ++k) {
+      x[static_cast<Eigen::Index>(k)] = points_[close[k]].log_focal - best_log;
+      y.row(static_cast<Eigen::Index>(k)) = points_[close[k]].loss.transpose();
+    }
+    const Eigen::MatrixXd parabolas = FitParabola(x, y);
+    const Eigen::Vector3d sum = parabolas.rowwise().sum();
+    if (!inside || !(sum[2] > 0.0)) return {best_log, 1.0};
+    const double shift = std::clamp(-0.5 * sum[1] / sum[2], -spacing_, spacing_);
+    const double classical = noise_px_s_ * noise_px_s_ / sum[2];
+    const double scores = (parabolas.row(1) + 2.0 * shift * parabolas.row(2)).squaredNorm() *
+                          kBlocks / (kBlocks - 1.0);
+    const double sandwich = scores / (4.0 * sum[2] * sum[2]);
+    return {best_log + shift, std::min(1.0, std::sqrt(std::max(classical, sandwich)))};
+  }
+
+  const Recording& recording_;
+  const CameraRotationsAtFocal& rotations_at_;
+  const StartOptions& options_;
+  const double log_guess_, spacing_;
+  std::vector<ScanPoint> points_;
+  StartResult near_;
+  double noise_px_s_ = -1.0, gyro_power_ = 0.0;
+  size_t pairs_ = 1;  // with a rotation, at the point that has most
+};
+
 }  // namespace
 
 Result<StartResult> FindStartAndFocal(const Recording& recording,
                                       const CameraRotationsAtFocal& rotations_at,
                                       const StartOptions& options,
                                       const FocalScanOptions& scan_options) {
-  const double side_px = std::max(recording.camera.width_px, recording.camera.height_px);
-  if (!(side_px > 0.0)) return BadInput("focal scan: the size of the picture is not known");
+  if (!(std::max(recording.camera.width_px, recording.camera.height_px) > 0)) {
+    return BadInput("focal scan: the size of the picture is not known");
+  }
   if (recording.gyro.empty() || recording.frames.empty()) {
     return CannotEstimate("focal scan: no gyro samples or no frames");
   }
@@ -92,122 +251,11 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
       !(scan_options.max_focal > scan_options.min_focal)) {
     return BadUsage("focal scan: expected 5 points or more and 0 < min_focal < max_focal");
   }
-  const double log_min = std::log(scan_options.min_focal * side_px);
-  const double spacing =
-      std::log(scan_options.max_focal / scan_options.min_focal) / (scan_options.points - 1);
-
-  // 1. Delay and orientation, to which a wrong focal length is mostly a scale: from the points
-  // nearest to the guess outwards, the first that works.
-  std::vector<ScanPoint> points(static_cast<size_t>(scan_options.points));
-  std::vector<size_t> order;
-  for (size_t k = 0; k < points.size(); ++k) {
-    points[k].log_focal = log_min + spacing * static_cast<double>(k);
-    points[k].rotations = rotations_at(std::exp(points[k].log_focal));
-    order.push_back(k);
-  }
-  const double log_guess = std::log(FocalToBeginWith(recording.camera));
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return std::abs(points[a].log_focal - log_guess) < std::abs(points[b].log_focal - log_guess);
-  });
-  StartOptions loose = options;
-  loose.max_rate_ratio = kLooseRateRatio;
-  Result<StartResult> near = CannotEstimate("");
-  tl::unexpected<Error> first_error = CannotEstimate("");
-  for (const size_t k : order) {
-    near = FindStart(recording, points[k].rotations, loose);
-    if (near) break;
-    if (k == order.front()) first_error = tl::unexpected<Error>(near.error());
-  }
-  if (!near) return first_error;
-  // The inverse of what FindStart makes of a lag.
-  const double lag_s = (near->delay_middle_row_s - SecondsSince(recording.frames.front().stamp_ns,
-                                                                recording.gyro.front().stamp_ns)) *
-                       (1.0 + near->clock_skew);
-
-  // 2. The scan, and two points more around its best.
-  for (ScanPoint& point : points) Measure(recording, *near, lag_s, options, &point);
-  double noise_px_s = -1.0, gyro_power = 0.0;
-  size_t pairs = 1;
-  const auto truncate = [&] {
-    for (const ScanPoint& point : points) {
-      if (point.squares.empty()) continue;
-      if (noise_px_s < 0.0 || point.noise_px_s < noise_px_s) noise_px_s = point.noise_px_s;
-      pairs = std::max(pairs, point.squares.size());
-      gyro_power = std::max(gyro_power, point.gyro_power);
-    }
-    const double cap = 2.0 * std::pow(kTruncateSigmas * noise_px_s, 2);
-    for (ScanPoint& point : points) {
-      point.loss = Eigen::VectorXd::Zero(kBlocks);
-      for (size_t i = 0; i < point.squares.size(); ++i) {
-        point.loss[point.blocks[i]] += std::min(point.squares[i], cap);
-      }
-      // A pair that found no rotation at this focal length counts as an outlier.
-      point.loss.array() += cap * static_cast<double>(pairs - point.squares.size()) / kBlocks;
-    }
-  };
-  const auto best_point = [&points] {
-    return static_cast<size_t>(std::min_element(points.begin(), points.end(),
-                                                [](const ScanPoint& x, const ScanPoint& y) {
-                                                  return x.loss.sum() < y.loss.sum();
-                                                }) -
-                               points.begin());
-  };
-  truncate();
-  const double coarse = points[best_point()].log_focal;
-  for (const double offset : {-0.5 * spacing, 0.5 * spacing}) {
-    ScanPoint point;
-    point.log_focal = coarse + offset;
-    point.rotations = rotations_at(std::exp(point.log_focal));
-    Measure(recording, *near, lag_s, options, &point);
-    points.push_back(std::move(point));
-  }
-  truncate();
-  std::sort(points.begin(), points.end(),
-            [](const ScanPoint& x, const ScanPoint& y) { return x.log_focal < y.log_focal; });
-
-  // 3. The parabola.
-  StartFocal focal;
-  const size_t best = best_point();
-  const double best_log = points[best].log_focal, best_loss = points[best].loss.sum();
-  double second_loss = -1.0;
-  std::vector<size_t> close;
-  for (size_t k = 0; k < points.size(); ++k) {
-    const double loss = points[k].loss.sum(), distance = std::abs(points[k].log_focal - best_log);
-    focal.curve.push_back(
-        {std::exp(points[k].log_focal), loss / (gyro_power * std::exp(2.0 * best_log))});
-    if (distance < 1.1 * spacing) close.push_back(k);
-    if (distance > kDistinctLog && (second_loss < 0.0 || loss < second_loss)) second_loss = loss;
-  }
-  focal.runner_up_ratio = second_loss > 0.0 ? best_loss / second_loss : 1.0;
-  Eigen::VectorXd x(static_cast<Eigen::Index>(close.size()));
-  Eigen::MatrixXd y(static_cast<Eigen::Index>(close.size()), kBlocks);
-  for (size_t k = 0; k < close.size(); ++k) {
-    x[static_cast<Eigen::Index>(k)] = points[close[k]].log_focal - best_log;
-    y.row(static_cast<Eigen::Index>(k)) = points[close[k]].loss.transpose();
-  }
-  const Eigen::MatrixXd parabolas = FitParabola(x, y);
-  const Eigen::Vector3d sum = parabolas.rowwise().sum();
-  double log_focal = best_log, sigma_log = 1.0;
-  const bool inside = best > 0 && best + 1 < points.size();
-  if (inside && sum[2] > 0.0) {
-    const double shift = std::clamp(-0.5 * sum[1] / sum[2], -spacing, spacing);
-    log_focal += shift;
-    const double classical = noise_px_s * noise_px_s / sum[2];
-    const double scores = (parabolas.row(1) + 2.0 * shift * parabolas.row(2)).squaredNorm() *
-                          kBlocks / (kBlocks - 1.0);
-    const double sandwich = scores / (4.0 * sum[2] * sum[2]);
-    sigma_log = std::min(1.0, std::sqrt(std::max(classical, sandwich)));
-  }
-  sigma_log = std::hypot(sigma_log, kModelLog);
-  focal.determined = sigma_log < kDeterminedLog && focal.runner_up_ratio < kMaxRunnerUp;
-  if (!focal.determined) {
-    log_focal = log_guess;
-    sigma_log = kUnknownLog;
-  }
-  focal.value_px = std::exp(log_focal);
-  focal.sigma_px = sigma_log * focal.value_px;
-
-  // 4. The start at that focal length.
+  FocalScan scan(recording, rotations_at, options, scan_options);
+  if (const Status near = scan.FindNear(); !near) return tl::unexpected(near.error());
+  scan.Scan();
+  StartFocal focal = scan.Fit();
+  // The start at that focal length.
   auto start = FindStart(recording, rotations_at(focal.value_px), options);
   if (!start) return start;
   if (!focal.determined) {

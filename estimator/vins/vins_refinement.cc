@@ -28,11 +28,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int kRounds = 3;
+constexpr int kRefinementRounds = 3;
 constexpr double kOutlierSigmas = 4.0;
-constexpr double kLossSigmas = 2.0;  // Cauchy's
-constexpr int kMinSightings = 2;
-constexpr double kMaxAccelNoiseFactor = 1e3;
+constexpr double kCauchySigmas = 2.0;
+constexpr int kMinUsedSightings = 2;
+constexpr double kMaxNoiseFactor = 1e3;
 
 struct Node {
   std::array<double, 4> q{};  // [x y z w]
@@ -139,13 +139,14 @@ class Problem {
     }
     used_landmarks_.clear();
     for (size_t j = 0; j < points_.size(); ++j) {
-      if (sightings[j] < kMinSightings) continue;
+      if (sightings[j] < kMinUsedSightings) continue;
       used_landmarks_.push_back(j);
       problem_->AddParameterBlock(points_[j].data(), 4, &point_manifold_);
     }
     for (size_t i = 0; i < active_.size(); ++i) {
       const VinsObservation& seen = window_.observations[i];
-      if (!active_[i] || sightings[static_cast<size_t>(seen.landmark)] < kMinSightings) continue;
+      if (!active_[i] || sightings[static_cast<size_t>(seen.landmark)] < kMinUsedSightings)
+        continue;
       const auto k = static_cast<size_t>(seen.keyframe);
       RowProjectionMeasurement m;
       m.node_to_row = window_.imu.Between(window_.keyframes[k].time_s, seen.time_s);
@@ -241,7 +242,7 @@ class Problem {
     }
     const double per_degree = sum / (3.0 * static_cast<double>(inertial_ids_.size()));
     accel_noise_factor_ =
-        std::clamp(accel_noise_factor_ * std::sqrt(per_degree), 1.0, kMaxAccelNoiseFactor);
+        std::clamp(accel_noise_factor_ * std::sqrt(per_degree), 1.0, kMaxNoiseFactor);
   }
 
   void DropOutliers() {
@@ -345,7 +346,7 @@ class Problem {
   RotationManifold rotation_manifold_;
   ceres::SphereManifold<3> direction_manifold_;
   ceres::SphereManifold<4> point_manifold_;
-  ceres::CauchyLoss loss_{kLossSigmas};
+  ceres::CauchyLoss loss_{kCauchySigmas};
 
   std::vector<Node> nodes_;
   Vector3d gravity_ = Vector3d::UnitZ(), bias_accel_ = Vector3d::Zero(), arm_ = Vector3d::Zero();
@@ -381,8 +382,8 @@ Status RefineVins(const VinsWindow& window, const VinsStructure& structure,
                   const VinsAlignment& alignment, const VinsOptions& options, VinsStart* start) {
   Problem problem(window, options);
   problem.SetStart(structure, alignment);
-  for (int round = 0; round < kRounds; ++round) {
-    if (Status solved = problem.Solve(round + 1 == kRounds); !solved) return solved;
+  for (int round = 0; round < kRefinementRounds; ++round) {
+    if (Status solved = problem.Solve(round + 1 == kRefinementRounds); !solved) return solved;
   }
   if (Status reported = problem.Report(start); !reported) return reported;
   start->scale_sigma = ScaleSigma(*start);

@@ -106,6 +106,9 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   setup.readout_s = calibration.readout_s;
   setup.R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
   setup.has_pixels = !recording.matches.empty() || !recording.tracks.empty();
+  if (recording.camera_stamps && recording.camera_stamps->repaired) {
+    setup.frame_stamp_jitter_s = recording.camera_stamps->jitter_s;
+  }
   const int64_t origin_ns = recording.gyro.front().stamp_ns;
   for (const Frame& frame : recording.frames) {
     setup.frames.push_back({SecondsSince(origin_ns, frame.stamp_ns), frame.exposure_s});

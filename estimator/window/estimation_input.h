@@ -3,28 +3,15 @@
 #define CAMGYRO_ESTIMATOR_WINDOW_ESTIMATION_INPUT_H_
 
 #include <cstdint>
-#include <limits>
 #include <vector>
 
+#include "core/calibration.h"
 #include "core/recording.h"
-#include "estimator/window/pair_graph.h"
+#include "estimator/window/timed_pair.h"
 
 namespace camgyro {
 
-// Two frames by their recorded stamps, seconds from EstimationInput::origin_ns.
-struct TimedPair {
-  int64_t id = 0;  // ascending with time_a_s
-  int frame_a = 0, frame_b = 0;
-  double time_a_s = 0.0, time_b_s = 0.0;
-  double exposure_a_s = std::numeric_limits<double>::quiet_NaN();  // NaN: not recorded
-  double exposure_b_s = std::numeric_limits<double>::quiet_NaN();
-  std::vector<Match> matches;  // empty for rotations
-  CameraRotation rotation;     // of recordings with attitudes
-
-  FrameTime first() const { return {time_a_s, exposure_a_s}; }
-  FrameTime second() const { return {time_b_s, exposure_b_s}; }
-};
-
+// Times are seconds from origin_ns.
 struct EstimationInput {
   int64_t origin_ns = 0;  // the first gyro stamp; camera stamps are counted from it as they are
   std::vector<TimedRate> rates;

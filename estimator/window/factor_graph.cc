@@ -32,6 +32,13 @@ ceres::Manifold* ManifoldOf(Geometry geometry) {
   return nullptr;
 }
 
+// Of a residual that is not a number, or has none where the parameters are.
+tl::unexpected<Error> NoValue() {
+  return CannotEstimate(
+      "a residual has no value at the estimate: a match has no ray through the lens there, or a "
+      "parameter has run away");
+}
+
 bool IsConstant(const Block& block, int coordinate) {
   return std::find(block.constant.begin(), block.constant.end(), coordinate) !=
          block.constant.end();
@@ -122,13 +129,13 @@ std::vector<const Factor*> FactorGraph::AllFactors() const {
   return factors;
 }
 
-FactorGraph::CovarianceReport FactorGraph::Covariance(
+Result<FactorGraph::CovarianceReport> FactorGraph::Covariance(
     const std::vector<Functional>& functionals) const {
   const std::vector<const Factor*> factors = AllFactors();
   const Unknowns unknowns(blocks_, factors);
   std::optional<NormalEquations> normal =
       MakeNormalEquations(*problem_, blocks_, factors, unknowns);
-  CHECK(normal) << "a factor could not be evaluated at the present state";
+  if (!normal) return NoValue();
 
   Eigen::MatrixXd weights =
       Eigen::MatrixXd::Zero(unknowns.size, static_cast<Eigen::Index>(functionals.size()));
@@ -138,13 +145,14 @@ FactorGraph::CovarianceReport FactorGraph::Covariance(
       weights(unknowns.offsets[k] + term.coordinate, static_cast<Eigen::Index>(i)) += term.weight;
     }
   }
-  CovarianceReport report;
-  if (!normal->information.Factorize()) return report;
+  const auto singular = [] { return CannotEstimate("the information matrix is singular"); };
+  if (!normal->information.Factorize()) return singular();
   const Eigen::MatrixXd X = normal->information.Solve(weights);
-  if (!X.allFinite()) return report;
+  if (!X.allFinite()) return singular();
+  CovarianceReport report;
   report.covariance = weights.transpose() * X;
   report.covariance = 0.5 * (report.covariance + report.covariance.transpose()).eval();
-  report.usable = (report.covariance.diagonal().array() > 0.0).all();
+  if (!(report.covariance.diagonal().array() > 0.0).all()) return singular();
 
   size_t f = 0;
   for (const auto& entry : factors_) {
@@ -162,7 +170,7 @@ FactorGraph::CovarianceReport FactorGraph::Covariance(
   return report;
 }
 
-Linearization FactorGraph::Linearize(const std::vector<FactorKey>& keys) const {
+Result<Linearization> FactorGraph::Linearize(const std::vector<FactorKey>& keys) const {
   std::vector<const Factor*> factors;
   for (const FactorKey key : keys) factors.push_back(&factors_.at(key));
   Linearization result;
@@ -179,8 +187,7 @@ Linearization FactorGraph::Linearize(const std::vector<FactorKey>& keys) const {
   FactorValue linear;
   Eigen::Index row = 0;
   for (const Factor* factor : factors) {
-    CHECK(EvaluateFactor(*problem_, blocks_, *factor, &linear))
-        << "a factor could not be evaluated";
+    if (!EvaluateFactor(*problem_, blocks_, *factor, &linear)) return NoValue();
     result.residuals.segment(row, linear.residuals.size()) = linear.residuals;
     Eigen::Index column = 0;
     for (const BlockId& id : factor->blocks) {
@@ -195,8 +202,8 @@ Linearization FactorGraph::Linearize(const std::vector<FactorKey>& keys) const {
   return result;
 }
 
-int FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
-                             const std::vector<FactorKey>& also) {
+Result<int> FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
+                                     const std::vector<FactorKey>& also) {
   const std::set<BlockId> leaving_set(leaving.begin(), leaving.end());
   std::vector<FactorKey> touched;
   for (const auto& [key, factor] : factors_) {
@@ -208,7 +215,9 @@ int FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
   }
   int undetermined = 0;
   if (!touched.empty()) {
-    const Linearization linear = Linearize(touched);
+    const Result<Linearization> linearized = Linearize(touched);
+    if (!linearized) return tl::unexpected(linearized.error());
+    const Linearization& linear = *linearized;
     // Columns: what leaves first. A staying Euclidean block gets a column for every coordinate,
     // zero for the constant ones, since the prior knows nothing of subsets.
     std::vector<Eigen::Index> order;

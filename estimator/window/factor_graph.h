@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/result.h"
+
 namespace ceres {
 class Manifold;
 class Problem;
@@ -137,21 +139,25 @@ class FactorGraph {
   };
   using Functional = std::vector<FunctionalTerm>;
   struct CovarianceReport {
-    bool usable = false;  // false: the information matrix is not positive definite
     Eigen::MatrixXd covariance;
     // Influence of each factor: minus the first-order effect of its residuals on the functionals
     // (one column per functional); sums to zero at the optimum.
     std::map<FactorKey, Eigen::VectorXd> influence;
   };
-  CovarianceReport Covariance(const std::vector<Functional>& functionals) const;
+  // Errors: kCannotEstimate where a factor has no value, or the information is not positive
+  // definite.
+  Result<CovarianceReport> Covariance(const std::vector<Functional>& functionals) const;
 
-  // Linearises the given factors by the blocks that they touch (sorted by id).
-  Linearization Linearize(const std::vector<FactorKey>& keys) const;
+  // Linearises the given factors by the blocks that they touch (sorted by id). Errors:
+  // kCannotEstimate where one has no value.
+  Result<Linearization> Linearize(const std::vector<FactorKey>& keys) const;
 
   // Removes `leaving` and every factor that touches them, and the factors `also`, and adds a
   // MarginalPrior that says the same about the neighbours. Returns the number of directions of
   // `leaving` that no factor determined (0 in a sound window). No neighbours: nothing is added.
-  int Marginalize(const std::vector<BlockId>& leaving, const std::vector<FactorKey>& also = {});
+  // Errors: those of Linearize; then nothing has changed.
+  Result<int> Marginalize(const std::vector<BlockId>& leaving,
+                          const std::vector<FactorKey>& also = {});
 
  private:
   std::vector<const Factor*> AllFactors() const;

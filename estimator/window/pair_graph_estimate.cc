@@ -4,80 +4,40 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "estimator/window/direction_search.h"
 #include "estimator/window/pair_blocks.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
-#include "factors/coplanarity_plane.h"
 #include "factors/robust.h"
-#include "factors/symmetric_transfer.h"
 
 namespace camgyro {
 
 std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   const Pair& pair = pairs_.at(id);
-  std::vector<double> residuals;
-  if (pair.measurement == nullptr) {
-    residuals.resize(3);
-    std::vector<const double*> p = {graph_.value(kShutterBlock).data(),
-                                    graph_.value(kRotationBlock).data()};
-    if (num_effects_ > 0) p.push_back(EffectsNow().values);
-    for (const int64_t frame : pair.frame_times) {
-      p.push_back(graph_.value(FrameTimeBlock(frame)).data());
-    }
-    for (const int64_t group : pair.groups) p.push_back(graph_.value(RatesBlock(group)).data());
-    CHECK(graph_.factors().at(pair.factor).cost->Evaluate(p.data(), residuals.data(), nullptr));
-    return residuals;
-  }
   const PairMeasurement& m = *pair.measurement;
-  std::vector<const double*> groups;
-  for (const int64_t group : pair.groups) groups.push_back(graph_.value(RatesBlock(group)).data());
-  if (options_.residual == ResidualKind::kSymmetricTransfer) {
-    std::vector<const double*> p = {graph_.value(kLensBlock).data(),
-                                    graph_.value(kShutterBlock).data(),
-                                    graph_.value(kRotationBlock).data()};
-    p.insert(p.end(), groups.begin(), groups.end());
-    return SymmetricTransfer(pair.measurement).IndependentResiduals(p.data());
-  }
-  const RotationChain chain(m.rate_times_s, GatherRates(m, groups.data()));
-  if (!EvaluatePairBearings(m, chain, graph_.value(kLensBlock).data(),
-                            graph_.value(kShutterBlock).data(), graph_.value(kRotationBlock).data(),
-                            EffectsNow().values, false, &bearings_,
-                            m.own_times ? OwnTimesOf(pair).data() : nullptr)) {
-    return residuals;
-  }
-  if (options_.residual != ResidualKind::kPlane) {
-    return FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold).residuals;
-  }
-  const PairPlane plane{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+  std::vector<double> residuals =
+      residual().Independent(pair.measurement, ParametersOf(id, pair), &bearings_);
+  if (!search || !residual().facts().has_direction || residuals.empty()) return residuals;
   double cost = 0.0;
-  for (size_t i = 0; i < m.matches.size(); ++i) {
-    residuals.push_back(EvaluatePlaneResidual(bearings_.a[i].ray_ref, bearings_.a[i].J_ray_px,
-                                              bearings_.b[i].ray_ref, bearings_.b[i].J_ray_px,
-                                              plane.DirectionOf(m, i), m.variance_a(),
-                                              m.variance_b())
-                            .value);
-    const double robust = Robustify(residuals.back(), m.robust_threshold).value;
+  for (const double r : residuals) {
+    const double robust = Robustify(r, m.robust_threshold).value;
     cost += robust * robust;
   }
-  if (search) {
-    const DirectionEstimate found =
-        FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold);
-    cost += CostOfPointsBehind(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold,
-                               plane.tau);
-    if (found.cost < cost) {
-      graph_.value(DirectionBlock(id)) = found.tau;
-      graph_.value(BendBlock(id)).setZero();
-      return found.residuals;
-    }
-  }
-  return residuals;
+  DirectionEstimate found =
+      FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold);
+  cost += CostOfPointsBehind(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold,
+                             graph_.value(DirectionBlock(id)));
+  if (!(found.cost < cost)) return residuals;
+  graph_.value(DirectionBlock(id)) = found.tau;
+  graph_.value(BendBlock(id)).setZero();
+  return std::move(found.residuals);
 }
 
 CrossFit PairGraph::CrossFitOf(int64_t id) {
   CrossFit fit;
-  if (options_.residual != ResidualKind::kPlane || pairs_.at(id).measurement == nullptr) return fit;
+  if (!residual().facts().has_direction) return fit;
   const std::vector<double> own = Residuals(id, /*search=*/false);  // fills the bearings, too
   if (own.size() < 2 * kMinMatches) return fit;
   const Pair& pair = pairs_.at(id);
@@ -116,14 +76,15 @@ Calibration PairGraph::Estimate() const {
     sum += Eigen::Vector3d(block.value);
     ++count;
   }
-  c.bias_gyro_rad_s = count > 0 ? Eigen::Vector3d(sum / count) : start_bias_;
-  if (num_effects_ > 0) c.effect_values = graph_.value(kEffectsBlock);
+  c.bias_gyro_rad_s = count > 0 ? Eigen::Vector3d(sum / count) : rates_.start_bias();
+  if (effects_ != nullptr) c.effect_values = graph_.value(kEffectsBlock);
   return c;
 }
 
-bool PairGraph::EstimateCovariance(double cluster_s, double inflation,
-                                   Calibration* calibration) const {
-  const int size = kStateSize + num_effects_;
+Status PairGraph::EstimateCovariance(double cluster_s, double inflation,
+                                     Calibration* calibration) const {
+  const int num_effects = effects_ != nullptr ? effects_->size() : 0;
+  const int size = kStateSize + num_effects;
   std::vector<FactorGraph::Functional> functionals(static_cast<size_t>(size));
   functionals[kStateFocal] = {{kLensBlock, 0}};
   functionals[kStateCx] = {{kLensBlock, 1}};
@@ -134,18 +95,19 @@ bool PairGraph::EstimateCovariance(double cluster_s, double inflation,
   for (const auto& [id, block] : graph_.blocks()) {
     if (id.kind == BlockKind::kBias) biases.push_back(id);
   }
-  if (biases.empty()) return false;
+  if (biases.empty()) return CannotEstimate("there is no pair of frames to estimate from");
   for (int k = 0; k < 3; ++k) {
     for (const BlockId& id : biases) {
       functionals[kStateBias + k].push_back({id, k, 1.0 / static_cast<double>(biases.size())});
     }
     functionals[kStateRotation + k] = {{kRotationBlock, k}};
   }
-  for (int i = 0; i < num_effects_; ++i) {
+  for (int i = 0; i < num_effects; ++i) {
     functionals[static_cast<size_t>(kStateSize + i)] = {{kEffectsBlock, i}};
   }
-  const FactorGraph::CovarianceReport report = graph_.Covariance(functionals);
-  if (!report.usable) return false;
+  const Result<FactorGraph::CovarianceReport> found = graph_.Covariance(functionals);
+  if (!found) return tl::unexpected(found.error());
+  const FactorGraph::CovarianceReport& report = *found;
 
   // Clustered covariance: the sum over stretches of time of each stretch's influence.
   std::map<int64_t, Eigen::VectorXd> clusters;
@@ -157,8 +119,8 @@ bool PairGraph::EstimateCovariance(double cluster_s, double inflation,
   for (const auto& entry : pairs_) add(entry.second.factor, entry.second.time_s);
   for (const auto& [frame, prior] : frame_time_priors_)
     add(prior, 1e-9 * static_cast<double>(frame));
-  for (const auto& entry : groups_) {
-    add(entry.second.factor, sample(entry.second.first_sample).time_s - calibration->delay_s);
+  for (const auto& entry : rates_.groups()) {
+    add(entry.second.factor, rates_.StartOf(entry.second) - calibration->delay_s);
   }
   const auto count = static_cast<double>(clusters.size());
   Eigen::MatrixXd covariance = inflation * report.covariance;
@@ -171,13 +133,13 @@ bool PairGraph::EstimateCovariance(double cluster_s, double inflation,
     covariance = wider.asDiagonal() * covariance * wider.asDiagonal();
   }
   calibration->covariance = covariance.topLeftCorner<kStateSize, kStateSize>();
-  calibration->effect_covariance = covariance.bottomRightCorner(num_effects_, num_effects_);
+  calibration->effect_covariance = covariance.bottomRightCorner(num_effects, num_effects);
   if (has_frame_times()) {
-    const int column = Effects()->frame_time_spread();
+    const int column = effects_->frame_time_spread();
     calibration->effect_covariance(column, column) =
         frame_time_spread_sigma_s_ * frame_time_spread_sigma_s_;
   }
-  return true;
+  return {};
 }
 
 }  // namespace camgyro

@@ -76,24 +76,17 @@ double PairGraph::RateMargin() const {
   return options_.rate_margin_s + (has_frame_times() ? kSpreads * *frame_time_spread_s_ : 0.0);
 }
 
-void PairGraph::AddFrameTimes(const FrameTime& frame_a, const FrameTime& frame_b, Pair* pair,
-                              std::vector<BlockId>* blocks) {
+void PairGraph::AddFrameTimes(const TimedPair& timed, Pair* pair) {
   if (!has_frame_times()) return;
-  for (const FrameTime& frame : {frame_a, frame_b}) {
-    const int64_t number = FrameNumber(frame.stamp_s);
+  for (const double stamp_s : {timed.time_a_s, timed.time_b_s}) {
+    const int64_t number = FrameNumber(stamp_s);
     if (!graph_.Has(FrameTimeBlock(number))) {
       graph_.AddBlock(FrameTimeBlock(number), {Geometry::kEuclidean, Eigen::VectorXd::Zero(1), {}});
       frame_time_priors_[number] = graph_.AddFactor(
           std::make_shared<FrameTimePrior>(frame_time_spread_s_), {FrameTimeBlock(number)});
     }
     pair->frame_times.push_back(number);
-    blocks->push_back(FrameTimeBlock(number));
   }
-}
-
-std::array<const double*, 2> PairGraph::OwnTimesOf(const Pair& pair) const {
-  return {graph_.value(FrameTimeBlock(pair.frame_times[0])).data(),
-          graph_.value(FrameTimeBlock(pair.frame_times[1])).data()};
 }
 
 PairTimes PairGraph::FrameTimesOf(const Pair& pair) const {
@@ -110,11 +103,11 @@ PairTimes PairGraph::FrameTimesOf(const Pair& pair) const {
   }
   equations.Begin();
   equations.Add(graph_, factor);
-  if (pair.measurement != nullptr) {
+  if (residual().facts().has_direction) {
     equations.Add(graph_, graph_.factors().at(pair.bend_prior));
   }
   for (const int64_t group : pair.groups) {
-    equations.Add(graph_, graph_.factors().at(groups_.at(group).factor));
+    equations.Add(graph_, graph_.factors().at(rates_.groups().at(group).factor));
   }
   const Eigen::Index rest = equations.g().size() - 2;
   Eigen::MatrixXd H_rest = equations.H().bottomRightCorner(rest, rest);
@@ -125,11 +118,12 @@ PairTimes PairGraph::FrameTimesOf(const Pair& pair) const {
   times.frame_a = pair.frame_times[0];
   times.frame_b = pair.frame_times[1];
   times.information = equations.H().topLeftCorner<2, 2>() - mixed.transpose() * solver.solve(mixed);
-  const auto [a, b] = OwnTimesOf(pair);
+  const double a = graph_.value(FrameTimeBlock(times.frame_a))[0];
+  const double b = graph_.value(FrameTimeBlock(times.frame_b))[0];
   // The score at offsets of zero, from that where they are.
   times.score = equations.g().head<2>() -
                 mixed.transpose() * solver.solve(equations.g().tail(rest)) -
-                times.information * Eigen::Vector2d(*a, *b);
+                times.information * Eigen::Vector2d(a, b);
   return times;
 }
 
@@ -145,7 +139,7 @@ void PairGraph::SetFrameTimeSpread(const Spread& spread) {
   CHECK_GT(spread.value_s, 0.0);
   *frame_time_spread_s_ = spread.value_s;
   frame_time_spread_sigma_s_ = spread.sigma_s;
-  graph_.value(kEffectsBlock)[Effects()->frame_time_spread()] = spread.value_s;
+  graph_.value(kEffectsBlock)[effects_->frame_time_spread()] = spread.value_s;
   graph_.RemoveFactor(effects_prior_);
   AddEffectsPrior();
 }

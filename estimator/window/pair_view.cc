@@ -1,14 +1,12 @@
 #include "estimator/window/pair_view.h"
 
-#include <glog/logging.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/window/direction_search.h"
+#include "estimator/window/pair_graph.h"
 #include "factors/robust.h"
-#include "factors/symmetric_transfer.h"
 
 namespace camgyro {
 
@@ -65,17 +63,6 @@ PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i)
   const Bearing &a = view.bearings.a[i], &b = view.bearings.b[i];
   return EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
                                plane.DirectionOf(m, i), m.variance_a(), m.variance_b());
-}
-
-std::vector<double> TransferResiduals(const PairView& view, const Calibration& calibration) {
-  const ShutterParameters shutter = ShutterOf(calibration);
-  const double* const parameters[] = {calibration.lens.data(), shutter.data(),
-                                      calibration.q_gyro_cam.coeffs().data(), view.rates.data()};
-  std::vector<double> residuals =
-      SymmetricTransfer(std::make_shared<const PairMeasurement>(view.measurement))
-          .IndependentResiduals(parameters);
-  CHECK_EQ(residuals.size(), 2 * view.measurement.matches.size());  // ViewPair kept no others
-  return residuals;
 }
 
 namespace {
@@ -182,7 +169,7 @@ double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t fir
 }
 
 bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
-              double noise_px, const PairGraphOptions& options, PairView* view,
+              double noise, const PairGraphOptions& options, PairView* view,
               const Eigen::Vector2d& offsets_s) {
   PairMeasurement& m = view->measurement;
   if (!RatesOfPair(input, pair, calibration, &m.rate_times_s, &view->rates, offsets_s)) {
@@ -192,11 +179,12 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
   m.frame_a = pair.first().Moved(offsets_s[0]);
   m.frame_b = pair.second().Moved(offsets_s[1]);
   m.size_px << calibration.width_px, calibration.height_px;
-  m.sigma_px = noise_px;
+  m.sigma = noise;
   m.noise = options.match_noise;
   m.robust_threshold = options.robust_threshold;
   m.lens = &GetLens(calibration.distortion_model);
   m.matches.clear();
+  m.q_a_b = pair.rotation.q_a_b;
   const double gap_s = m.frame_b.stamp_s - m.frame_a.stamp_s;
   m.readout_over_gap = calibration.readout_s / gap_s;
   view->bend_sigma_rad = BendSigma(
@@ -214,8 +202,7 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
                         match.px_a, calibration.pair_effects(), &a) &&
         EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, m.frame_b, m.size_px,
                         match.px_b, calibration.pair_effects(), &b) &&
-        (options.residual != ResidualKind::kSymmetricTransfer ||
-         HasTransfer(*m.lens, calibration.lens, a, b))) {
+        options.residual->HasResidual(*m.lens, calibration.lens, a, b)) {
       b.ScaleNoise(match.noise_factor_b);
       m.matches.push_back(match);
       view->bearings.a.push_back(a);

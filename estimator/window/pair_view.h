@@ -7,6 +7,7 @@
 
 #include "core/calibration.h"
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_graph_options.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/pair_bearings.h"
 
@@ -31,10 +32,11 @@ struct PairPlane {
   Eigen::Vector3d DirectionOf(const PairMeasurement& pair, size_t i) const;
 };
 
-// False where the gyro's samples do not cover the pair. noise: pixels. Shutter, lens, effects and
-// bias are the calibration's. offsets_s: of the frames' times from their stamps.
+// False where the gyro's samples do not cover the pair. noise: pixels, or radians of attitudes.
+// Shutter, lens, effects and bias are the calibration's; matches are those that the residual of the
+// options has. offsets_s: of the frames' times from their stamps.
 [[nodiscard]] bool ViewPair(const EstimationInput& input, const TimedPair& pair,
-                            const Calibration& calibration, double noise_px,
+                            const Calibration& calibration, double noise,
                             const PairGraphOptions& options, PairView* view,
                             const Eigen::Vector2d& offsets_s = Eigen::Vector2d::Zero());
 
@@ -54,10 +56,6 @@ double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t fir
                         size_t step = 1);
 // Of match i, in sigmas, without loss.
 PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i);
-
-// Of a view made for ResidualKind::kSymmetricTransfer: SymmetricTransfer::IndependentResiduals, two
-// per match. calibration: that of the view.
-std::vector<double> TransferResiduals(const PairView& view, const Calibration& calibration);
 
 // The samples that a pair needs, and one beyond on both sides; false where there are none, one is
 // saturated, or two of them are further apart than 30 ms and than five mean intervals.

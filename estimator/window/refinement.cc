@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
-#include "core/robust_statistics.h"
-#include "estimator/window/pair_view.h"
+#include "estimator/window/noise_scale.h"
+#include "estimator/window/pair_graph.h"
 #include "factors/robust.h"
 
 namespace camgyro {
@@ -74,45 +75,6 @@ class FitSum {
   int inliers_ = 0, matches_ = 0;
 };
 
-// The noise of the pairs [px, rad of attitudes] from residuals of which the rates, fitted as well,
-// have taken a part.
-class NoiseScale {
- public:
-  // Attitudes that follow the gyro itself agree with it far better than its noise: less than this
-  // share of it is never believed of them. It makes the variance of a turn 11 % larger. Smaller
-  // scales say no more, and the factorisation of the information fails.
-  static constexpr double kLeastShareOfGyro = 1.0 / 3.0;
-  // Exact pixels, of simulations: no tracker comes near [px].
-  static constexpr double kLeastPx = 1e-3;
-
-  // sigma: of a gyro sample [rad/s]; lost: degrees of freedom of a pair that are its own.
-  NoiseScale(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-             const Eigen::Vector3d& gyro_sigma_rad_s, bool rotations, int lost)
-      : lost_(lost), least_(kLeastPx) {
-    if (!rotations || input.rates.size() < 2) return;
-    std::vector<double> gaps;
-    for (const TimedPair& pair : pairs) gaps.push_back(pair.time_b_s - pair.time_a_s);
-    const double interval_s = (input.rates.back().time_s - input.rates.front().time_s) /
-                              static_cast<double>(input.rates.size() - 1);
-    gyro_variance_ = gyro_sigma_rad_s.squaredNorm() / 3.0 * interval_s * MedianInPlace(&gaps);
-    least_ = kLeastShareOfGyro * std::sqrt(gyro_variance_);
-  }
-
-  // residuals: in sigmas of `scale`, after a solve. Attitudes keep the share s^2 / (s^2 + g) of a
-  // misfit with the variance s^2 + g, s being the scale and g the gyro's variance of a turn.
-  double Next(const std::vector<std::vector<double>>& residuals, double scale) const {
-    const double kept = scale * RobustScale(residuals, lost_);
-    const double misfit = kept * (1.0 + gyro_variance_ / (scale * scale));
-    const double variance = misfit * misfit - gyro_variance_;
-    return std::max({1e-3 * scale, least_, std::sqrt(std::max(0.0, variance))});
-  }
-
- private:
-  int lost_;
-  double least_;
-  double gyro_variance_ = 0.0;  // of a turn between attitudes, per axis [rad^2]; 0 with pixels
-};
-
 // The spread of the frames' own times, if they have any, for the next solve. True if it has
 // settled: within 3 %, as the scale of the noise, or so small that no match shows it.
 bool UpdateFrameTimes(PairGraph* graph, std::vector<FrameOffset>* offsets) {
@@ -126,103 +88,166 @@ bool UpdateFrameTimes(PairGraph* graph, std::vector<FrameOffset>* offsets) {
   return std::abs(spread.value_s - before_s) < std::max(kNothingS, 0.03 * before_s);
 }
 
+// The frames' own times where each pair says less of them by the factor that widens the covariance:
+// its direction has taken noise for itself there, too.
+std::vector<FrameOffset> WidenedOffsets(const PairGraph& graph, double inflation) {
+  std::vector<PairTimes> times = graph.FrameTimes();
+  for (PairTimes& pair : times) {
+    pair.score /= inflation;
+    pair.information /= inflation;
+  }
+  return OffsetsOf(times, graph.frame_time_spread_s());
+}
+
 // A tenth of a sigma. Robust weights and strong correlations (f and k1) make steps fall short.
 constexpr double kCostTolerance = 0.005;
+
+constexpr int kLeastPairs = 10;
+
+// Noise scale, directions and solve in turns.
+class Refinement {
+ public:
+  Refinement(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+             const Calibration& start, const Prior& prior, const RefinementOptions& options)
+      : input_(input),
+        pairs_(pairs),
+        prior_(prior),
+        options_(options),
+        graph_options_(options.graph),
+        facts_((pairs.empty() ? *options.graph.residual : ResidualOf(pairs.front(), options.graph))
+                   .facts()),
+        noise_(facts_, input, pairs, options.graph.gyro_sigma_rad_s) {
+    if (!pairs.empty()) graph_options_.residual = &ResidualOf(pairs.front(), options.graph);
+    scale_ = graph_options_.first_sigma();
+    result_.calibration = start;
+  }
+
+  Result<Refined> Run() {
+    double last_cost = 0.0;
+    for (result_.rounds = 1; result_.rounds <= options_.max_rounds; ++result_.rounds) {
+      const Calibration before = result_.calibration;
+      // Rates are kept around the pairs as the delay was when they were added.
+      if (graph_ == nullptr ||
+          LargestShift(pairs_, before, built_at_) > 0.5 * graph_options_.rate_margin_s) {
+        if (const Status built = Build(); !built) return tl::unexpected(built.error());
+      }
+      // Every round searches the directions anew: with the calibration of the round before, another
+      // minimum may be the right one (little parallax has several).
+      if (result_.rounds == 1) {
+        FindFirstScale();
+      } else if (facts_.has_direction) {
+        AllResiduals(/*search=*/true);
+      }
+      const SolveReport report = graph_->Solve({30, 1e-5, kCostTolerance});
+      if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
+
+      const bool spread_settled = UpdateFrameTimes(graph_.get(), &result_.frame_times);
+      const auto residuals = AllResiduals(/*search=*/false);
+      const double next_scale = noise_.Next(residuals, scale_);
+      result_.calibration = graph_->Estimate();
+      const bool last = result_.rounds == options_.max_rounds;
+      if ((std::abs(next_scale / scale_ - 1.0) > 0.03 || !spread_settled) && !last) {
+        SetScale(next_scale);
+        continue;
+      }
+      // Where the next round would start from is not worth a covariance; the end is.
+      const bool costs_settled = std::abs(report.final_cost - last_cost) < 2e-4 * report.final_cost;
+      last_cost = report.final_cost;
+      if (!costs_settled && !last) continue;
+      if (const Status judged = Judge(before, residuals); !judged) {
+        return tl::unexpected(judged.error());
+      }
+      if (result_.converged) break;
+    }
+    return std::move(result_);
+  }
+
+ private:
+  // The graph at the present calibration.
+  Status Build() {
+    graph_options_.sigma = scale_;
+    built_at_ = result_.calibration;
+    graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_);
+    for (const TimedRate& rate : input_.rates) graph_->AddRate(rate);
+    result_.skipped_pairs = 0;
+    for (const TimedPair& pair : pairs_) {
+      if (graph_->AddPair(pair) != AddPairResult::kAdded) ++result_.skipped_pairs;
+    }
+    if (graph_->num_pairs() < kLeastPairs) {
+      return CannotEstimate("only " + std::to_string(graph_->num_pairs()) +
+                            " pairs of frames can be used (at least " +
+                            std::to_string(kLeastPairs) +
+                            " are needed): the others lack matches or gyro samples");
+    }
+    ids_ = graph_->pair_ids();
+    return {};
+  }
+
+  // The scale at the start, misfit included, so that a poor start is not cut off by the loss;
+  // directions depend on it.
+  void FindFirstScale() {
+    SetScale(noise_.Next(AllResiduals(/*search=*/false), scale_));
+    if (!facts_.of_attitudes) SetScale(noise_.Next(AllResiduals(/*search=*/true), scale_));
+  }
+
+  void SetScale(double scale) {
+    scale_ = scale;
+    for (const int64_t id : ids_) graph_->SetSigma(id, scale_);
+  }
+
+  std::vector<std::vector<double>> AllResiduals(bool search) {
+    std::vector<std::vector<double>> residuals;
+    for (const int64_t id : ids_) residuals.push_back(graph_->Residuals(id, search));
+    return residuals;
+  }
+
+  // Covariance, quality, and whether the last round has moved the estimate.
+  Status Judge(const Calibration& before, const std::vector<std::vector<double>>& residuals) {
+    const StateVector moved = Difference(result_.calibration, before);
+    CrossFit cross_fit;
+    for (const int64_t id : ids_) cross_fit += graph_->CrossFitOf(id);
+    if (const Status known = graph_->EstimateCovariance(options_.cluster_s, cross_fit.inflation(),
+                                                        &result_.calibration);
+        !known) {
+      return known;
+    }
+    if (graph_->has_frame_times()) {
+      result_.frame_times = WidenedOffsets(*graph_, cross_fit.inflation());
+    }
+    FitSum sum(graph_options_, facts_.per_match);
+    for (const auto& pair : residuals) sum.Add(pair);
+    FitQuality& q = result_.quality;
+    q = FitQuality();
+    q.pairs = graph_->num_pairs();
+    q.noise_px = scale_;
+    q.matches = sum.matches();
+    q.rms_px = scale_ * sum.rms();
+    q.inlier_ratio = sum.inlier_ratio();
+    result_.converged =
+        (moved.cwiseAbs().array() < 0.3 * result_.calibration.sigma().array()).all();
+    return {};
+  }
+
+  const EstimationInput& input_;
+  const std::vector<TimedPair>& pairs_;
+  const Prior& prior_;
+  const RefinementOptions& options_;
+  PairGraphOptions graph_options_;
+  const PairResidual::Facts& facts_;
+  const NoiseScale noise_;
+  std::unique_ptr<PairGraph> graph_;
+  std::vector<int64_t> ids_;
+  Calibration built_at_;
+  double scale_ = 1.0;
+  Refined result_;
+};
 
 }  // namespace
 
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                        const Calibration& start, const Prior& prior,
                        const RefinementOptions& options) {
-  Refined result;
-  result.calibration = start;
-  PairGraphOptions graph_options = options.graph;
-  const bool rotations = !pairs.empty() && pairs.front().matches.empty();
-  const ResidualCounts counts = rotations ? ResidualCounts{1, 0} : CountsOf(graph_options.residual);
-  const int lost = counts.lost_per_pair;
-  std::unique_ptr<PairGraph> graph;
-  std::vector<int64_t> ids;
-  const auto all_residuals = [&](bool search) {
-    std::vector<std::vector<double>> residuals;
-    for (const int64_t id : ids) residuals.push_back(graph->Residuals(id, search));
-    return residuals;
-  };
-  const NoiseScale noise(input, pairs, graph_options.gyro_sigma_rad_s, rotations, lost);
-  double scale = rotations ? options.sigma_rad : graph_options.sigma_px;
-  const auto set_scale = [&](double next) {
-    scale = next;
-    for (const int64_t id : ids) graph->SetSigma(id, scale);
-  };
-  Calibration built_at;
-  double last_cost = 0.0;
-  for (result.rounds = 1; result.rounds <= options.max_rounds; ++result.rounds) {
-    const Calibration before = result.calibration;
-    // Rates are kept around the pairs as the delay was when they were added.
-    if (graph == nullptr ||
-        LargestShift(pairs, before, built_at) > 0.5 * graph_options.rate_margin_s) {
-      graph_options.sigma_px = scale;
-      built_at = before;
-      graph = std::make_unique<PairGraph>(before, prior, graph_options);
-      for (const TimedRate& rate : input.rates) graph->AddRate(rate);
-      result.skipped_pairs = 0;
-      for (const TimedPair& pair : pairs) {
-        const AddPairResult added =
-            rotations ? graph->AddRotation(pair.id, pair.first(), pair.second(),
-                                           pair.rotation.q_a_b, scale)
-                      : graph->AddPair(pair.id, pair.first(), pair.second(), pair.matches);
-        if (added != AddPairResult::kAdded) ++result.skipped_pairs;
-      }
-      if (graph->num_pairs() < 10) {
-        return CannotEstimate("only " + std::to_string(graph->num_pairs()) +
-                              " pairs of frames can be used (at least 10 are needed): the others "
-                              "lack matches or gyro samples");
-      }
-      ids = graph->pair_ids();
-    }
-    if (result.rounds == 1) {
-      // The scale at the start, misfit included, so that a poor start is not cut off by the loss;
-      // directions depend on it.
-      set_scale(noise.Next(all_residuals(false), scale));
-      if (!rotations) set_scale(noise.Next(all_residuals(true), scale));
-    }
-    // Every round searches the directions anew: with the calibration of the round before, another
-    // minimum may be the right one (little parallax has several).
-    if (!rotations && result.rounds > 1) all_residuals(/*search=*/true);
-    const SolveReport report = graph->Solve({30, 1e-5, kCostTolerance});
-    if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
-
-    const bool spread_settled = UpdateFrameTimes(graph.get(), &result.frame_times);
-    const auto residuals = all_residuals(/*search=*/false);
-    const double next_scale = noise.Next(residuals, scale);
-    result.calibration = graph->Estimate();
-    const StateVector moved = Difference(result.calibration, before);
-    const bool last = result.rounds == options.max_rounds;
-    if ((std::abs(next_scale / scale - 1.0) > 0.03 || !spread_settled) && !last) {
-      set_scale(next_scale);
-      continue;
-    }
-    // Where the next round would start from is not worth a covariance; the end is.
-    const bool costs_settled = std::abs(report.final_cost - last_cost) < 2e-4 * report.final_cost;
-    last_cost = report.final_cost;
-    if (!costs_settled && !last) continue;
-    CrossFit cross_fit;
-    for (const int64_t id : ids) cross_fit += graph->CrossFitOf(id);
-    if (!graph->EstimateCovariance(options.cluster_s, cross_fit.inflation(), &result.calibration)) {
-      return CannotEstimate("the information matrix is singular");
-    }
-    FitQuality& q = result.quality;
-    q = FitQuality();
-    q.pairs = graph->num_pairs();
-    q.noise_px = scale;
-    FitSum sum(graph_options, counts.per_match);
-    for (const auto& pair : residuals) sum.Add(pair);
-    q.matches = sum.matches();
-    q.rms_px = scale * sum.rms();
-    q.inlier_ratio = sum.inlier_ratio();
-    result.converged = (moved.cwiseAbs().array() < 0.3 * result.calibration.sigma().array()).all();
-    if (result.converged) break;
-  }
-  return result;
+  return Refinement(input, pairs, start, prior, options).Run();
 }
 
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
@@ -245,23 +270,14 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
                          const Calibration& calibration, double noise_px,
                          const PairGraphOptions& options) {
   UnseenFit fit;
-  FitSum sum(options, CountsOf(options.residual).per_match);
-  PairView view;
+  FitSum sum(options, options.residual->facts().per_match);
+  std::vector<double> residuals;
   for (const TimedPair& pair : pairs) {
-    if (options.residual == ResidualKind::kSymmetricTransfer) {
-      if (!ViewPair(input, pair, calibration, noise_px, options, &view)) continue;
-      if (view.bearings.a.size() < PairGraph::kMinMatches) continue;
-      ++fit.pairs;
-      sum.Add(TransferResiduals(view, calibration));
+    if (!ResidualOf(pair, options)
+             .Unseen(input, pair, calibration, noise_px, options, &residuals)) {
       continue;
     }
-    PairPlane plane;
-    if (!FitPair(input, pair, calibration, noise_px, options, &view, &plane, 0, 2)) continue;
     ++fit.pairs;
-    std::vector<double> residuals;
-    for (size_t i = 1; i < view.bearings.a.size(); i += 2) {
-      residuals.push_back(ResidualOf(view, plane, i).value);
-    }
     sum.Add(residuals);
   }
   fit.matches = sum.matches();

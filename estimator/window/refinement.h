@@ -9,15 +9,15 @@
 #include "core/calibration.h"
 #include "core/result.h"
 #include "estimator/window/estimation_input.h"
-#include "estimator/window/pair_graph.h"
+#include "estimator/window/frame_times.h"
+#include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
 
 struct RefinementOptions {
   PairGraphOptions graph;
-  int max_rounds = 6;       // noise scale, directions and solve, until the estimate settles
-  double cluster_s = 2.0;   // stretches of the clustered covariance
-  double sigma_rad = 2e-3;  // first guess of the noise of camera rotations (attitudes)
+  int max_rounds = 6;      // noise scale, directions and solve, until the estimate settles
+  double cluster_s = 2.0;  // stretches of the clustered covariance
 };
 
 struct FitQuality {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/robust_statistics.h"
 #include "core/time.h"
 #include "estimator/window/estimation_input.h"
 
@@ -15,7 +14,8 @@ SlidingWindow::SlidingWindow(const Calibration& start, const Prior& prior, int64
     : options_(options),
       origin_ns_(origin_ns),
       graph_(start, prior, options.graph),
-      noise_px_(options.graph.sigma_px) {
+      noise_scale_(options.graph.residual->facts()),
+      noise_px_(options.graph.first_sigma()) {
   latest_.estimate = start;
   latest_.noise_px = noise_px_;
 }
@@ -38,10 +38,13 @@ AddResult SlidingWindow::AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns, std::ve
   const double time_a_s = SecondsSince(origin_ns_, stamp_a_ns);
   if (stamp_b_ns <= stamp_a_ns || time_a_s < last_pair_time_s_) return AddResult::kNotIncreasing;
   last_pair_time_s_ = time_a_s;
-  pending_.push_back({stamp_b_ns,
-                      {time_a_s, exposure_a_s},
-                      {SecondsSince(origin_ns_, stamp_b_ns), exposure_b_s},
-                      std::move(matches)});
+  Pending& next = pending_.emplace_back();
+  next.stamp_b_ns = stamp_b_ns;
+  next.pair.time_a_s = time_a_s;
+  next.pair.time_b_s = SecondsSince(origin_ns_, stamp_b_ns);
+  next.pair.exposure_a_s = exposure_a_s;
+  next.pair.exposure_b_s = exposure_b_s;
+  next.pair.matches = std::move(matches);
   ProcessPending();
   if (pending_.size() > kMaxPending) {  // the gyro is silent
     pending_.pop_front();
@@ -52,9 +55,9 @@ AddResult SlidingWindow::AddPair(int64_t stamp_a_ns, int64_t stamp_b_ns, std::ve
 
 void SlidingWindow::ProcessPending() {
   while (!pending_.empty()) {
-    const Pending& next = pending_.front();
-    const AddPairResult added =
-        graph_.AddPair(next_pair_id_, next.frame_a, next.frame_b, next.matches);
+    Pending& next = pending_.front();
+    next.pair.id = next_pair_id_;
+    const AddPairResult added = graph_.AddPair(next.pair);
     if (added == AddPairResult::kGyroTooLate) return;
     if (added == AddPairResult::kAdded) {
       ++next_pair_id_;
@@ -64,7 +67,7 @@ void SlidingWindow::ProcessPending() {
       ++num_skipped_;
     }
     // A pair to come starts after this one; its delay may still move, but not by a second.
-    graph_.ForgetOldRates(next.frame_a.stamp_s + DelayOf(latest_.estimate, next.frame_a) - 1.0);
+    graph_.ForgetOldRates(next.pair.time_a_s + DelayOf(latest_.estimate, next.pair.first()) - 1.0);
     pending_.pop_front();
   }
 }
@@ -76,39 +79,47 @@ void SlidingWindow::Process(const Pending& pair) {
     for (const int64_t id : graph_.pair_ids()) graph_.Residuals(id, /*search=*/true);
     UpdateNoise();
   }
-  const SolveReport report = graph_.Solve({settled_ ? 4 : 10, 1e-4});
-  if (!report.usable) {
-    ++num_failed_solves_;  // the last good estimate stands
-    return;
-  }
-  UpdateNoise();
-  Calibration estimate = graph_.Estimate();
-  // Of the last 100 pairs or so.
-  cross_fit_ = cross_fit_ * 0.99;
-  cross_fit_ += graph_.CrossFitOf(graph_.pair_ids().back());
-  if (!graph_.EstimateCovariance(/*cluster_s=*/2.0, cross_fit_.inflation(), &estimate)) {
+  Calibration estimate;
+  if (const Status solved = SolveWindow(&estimate); !solved) {
     ++num_failed_solves_;
+    failure_ = solved.error().message;
     return;
   }
+  failure_.clear();
   settled_ = settled_ || Settled(estimate);
   latest_ = {pair.stamp_b_ns, estimate, noise_px_, settled_};
   if (listener_) listener_(latest_);
 
   const int keep =
       settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.unsettled_stride;
-  if (graph_.num_pairs() <= keep) return;
-  while (graph_.num_pairs() > keep) graph_.MarginalizeOldest();
+  while (graph_.num_pairs() > keep) {
+    if (const Status left = graph_.MarginalizeOldest(); !left) {
+      ++num_failed_solves_;
+      failure_ = left.error().message;
+      return;  // the next window tries again
+    }
+  }
+}
+
+Status SlidingWindow::SolveWindow(Calibration* estimate) {
+  const SolveReport report = graph_.Solve({settled_ ? 4 : 10, 1e-4});
+  if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
+  UpdateNoise();
+  *estimate = graph_.Estimate();
+  // Of the last 100 pairs or so.
+  cross_fit_ = cross_fit_ * 0.99;
+  cross_fit_ += graph_.CrossFitOf(graph_.pair_ids().back());
+  return graph_.EstimateCovariance(/*cluster_s=*/2.0, cross_fit_.inflation(), estimate);
 }
 
 void SlidingWindow::UpdateNoise() {
   std::vector<std::vector<double>> residuals;
   const std::vector<int64_t> ids = graph_.pair_ids();
   for (const int64_t id : ids) residuals.push_back(graph_.Residuals(id, /*search=*/false));
-  const double relative =
-      std::max(1e-3, RobustScale(residuals, CountsOf(options_.graph.residual).lost_per_pair));
+  const double growth = noise_scale_.Growth(residuals, noise_px_);
   // A settled window holds few pairs: its scale is averaged over time.
-  noise_px_ *= settled_ ? std::pow(relative, 0.1) : relative;
-  graph_.options()->sigma_px = noise_px_;
+  noise_px_ *= settled_ ? std::pow(growth, 0.1) : growth;
+  graph_.options()->sigma = noise_px_;
   for (const int64_t id : ids) graph_.SetSigma(id, noise_px_);
   if (graph_.has_frame_times()) UpdateFrameTimes();
 }

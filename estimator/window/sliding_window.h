@@ -10,6 +10,8 @@
 
 #include "core/calibration.h"
 #include "core/recording.h"
+#include "core/result.h"
+#include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
 
 namespace camgyro {
@@ -69,20 +71,24 @@ class SlidingWindow {
   const WindowUpdate& latest() const { return latest_; }
   int num_used_pairs() const { return num_used_; }
   int num_skipped_pairs() const { return num_skipped_; }
+  // Windows without a result: the last good estimate stands.
   int num_failed_solves() const { return num_failed_solves_; }
+  // Why the latest one has none; empty if it has.
+  const std::string& failure() const { return failure_; }
   const PairGraph& graph() const { return graph_; }
 
  private:
   struct Pending {
     int64_t stamp_b_ns = 0;
-    FrameTime frame_a, frame_b;
-    std::vector<Match> matches;
+    TimedPair pair;
   };
 
   static constexpr size_t kMaxPending = 300;  // pairs that wait for the gyro; then the oldest goes
 
   void ProcessPending();
   void Process(const Pending& pair);
+  // Errors: kCannotEstimate.
+  Status SolveWindow(Calibration* estimate);
   void UpdateNoise();
   void UpdateFrameTimes();
   bool Settled(const Calibration& estimate) const;
@@ -97,9 +103,11 @@ class SlidingWindow {
   double last_pair_time_s_ = -std::numeric_limits<double>::infinity();
   int64_t next_pair_id_ = 0;
   int num_used_ = 0, num_skipped_ = 0, num_failed_solves_ = 0;
+  const NoiseScale noise_scale_;
   double noise_px_ = 1.0;
   CrossFit cross_fit_;
   bool settled_ = false;
+  std::string failure_;
 };
 
 }  // namespace camgyro

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "frontend/readers/frame_order.h"
 #include "frontend/readers/image_file.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
@@ -165,7 +166,9 @@ class BagPass {
       TakeCameraInfo(Concat(path_, ": ", bag_->topics()[*info_].name), *info_message_, is_rectified,
                      recording_);
     }
-    return CheckFrames(Concat(path_, ": ", image_name), recording_->frames);
+    const std::string where = Concat(path_, ": ", image_name);
+    if (Status frames = CheckFrames(where, recording_->frames); !frames) return frames;
+    return order_.Mend(where, recording_);
   }
 
   // Of these IMU topics, in this order, the one that is taken; its samples go into the recording.
@@ -219,10 +222,11 @@ class BagPass {
       if (!first) return BadInput(place + ": " + first.error().message);
       recording_->camera.width_px = first->cols;
       recording_->camera.height_px = first->rows;
-    } else if (const auto wrong = NotIncreasing(frames.back().stamp_ns, message.stamp_ns)) {
-      return BadInput(place + ": " + *wrong);
     }
-    frames.emplace_back().stamp_ns = message.stamp_ns;
+    Frame frame;
+    frame.stamp_ns = message.stamp_ns;
+    order_.Add(
+        std::move(frame), [&] { return place; }, &frames);
     return {};
   }
 
@@ -232,6 +236,7 @@ class BagPass {
   const std::optional<size_t> info_;
   Recording* const recording_;
   std::map<size_t, ImuTopic> imus_;
+  FrameOrder order_;
   std::optional<BagCameraInfo> info_message_;
 };
 
@@ -239,31 +244,33 @@ class BagFrames : public FrameSource {
  public:
   BagFrames(const Recording& recording, const std::string& path, std::unique_ptr<Bag> bag,
             size_t topic)
-      : recording_(recording), path_(path), bag_(std::move(bag)), topic_(bag_->topics()[topic]) {}
+      : FrameSource(recording), path_(path), bag_(std::move(bag)), topic_(bag_->topics()[topic]) {}
 
-  Result<bool> Next(cv::Mat* gray) override {
+ protected:
+  Result<bool> Decode(Decoded* decoded) override {
     if (next_ == recording_.frames.size()) return false;
     BagMessage message;
-    const Result<bool> next = bag_->Next(&message);
-    if (!next) return next;
-    if (!*next) return BadInput(Concat(path_, ": ", topic_.name, " ends after picture ", next_));
+    do {
+      const Result<bool> next = bag_->Next(&message);
+      if (!next) return next;
+      if (!*next) return BadInput(Concat(path_, ": ", topic_.name, " ends after picture ", next_));
+    } while (pictures_++ < recording_.PictureOf(next_));
+    decoded->place = Place(path_, topic_, pictures_ - 1);
     Result<cv::Mat> image = Gray(message);
-    if (!image) return BadInput(Place(path_, topic_, next_) + ": " + image.error().message);
-    if (image->cols != recording_.camera.width_px || image->rows != recording_.camera.height_px) {
-      return BadInput(Concat(Place(path_, topic_, next_), ": has ", image->cols, " x ", image->rows,
-                             " pixels, expected those of the first"));
-    }
-    *gray = std::move(*image);
+    if (!image) return BadInput(decoded->place + ": " + image.error().message);
+    decoded->width_px = image->cols;
+    decoded->height_px = image->rows;
+    decoded->picture = std::move(*image);
     ++next_;
     return true;
   }
 
  private:
-  const Recording& recording_;
   const std::string path_;
   const std::unique_ptr<Bag> bag_;
   const BagTopic topic_;
-  size_t next_ = 0;
+  size_t pictures_ = 0;  // read
+  size_t next_ = 0;      // frame
 };
 
 }  // namespace

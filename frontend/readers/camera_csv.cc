@@ -95,19 +95,13 @@ Result<FrameTable> ReadFrameTable(const std::string& file) {
                         " s was found, expected seconds, 0 to ", kLongestExposureS));
       }
     }
-    if (!table.frames.empty()) {
-      const Frame& last = table.frames.back();
-      if (frame.stamp_ns <= last.stamp_ns) {
-        csv.Fail(Concat("timestamp ", frame.stamp_ns,
-                        frame.stamp_ns == last.stamp_ns ? " repeats" : " goes back", ", after ",
-                        last.stamp_ns, "; expected strictly increasing stamps"));
-      }
-      if (frame.image_file.empty() != last.image_file.empty()) {
-        csv.Fail("column 2, filename: expected a name in every row, or in none");
-      }
+    if (!table.frames.empty() &&
+        frame.image_file.empty() != table.frames.back().image_file.empty()) {
+      csv.Fail("column 2, filename: expected a name in every row, or in none");
     }
     if (!csv.status()) break;
-    table.frames.push_back(std::move(frame));
+    table.order.Add(
+        std::move(frame), [&csv] { return csv.Place(); }, &table.frames);
     table.lines.push_back(csv.line());
   }
   if (!csv.status()) return tl::unexpected(csv.status().error());

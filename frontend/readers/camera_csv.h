@@ -8,13 +8,15 @@
 
 #include "core/recording.h"
 #include "core/result.h"
+#include "frontend/readers/frame_order.h"
 
 namespace camgyro {
 
 // cam0/data.csv: #timestamp [ns][,filename[,exposure [s]]]. image_file is the name as written.
 struct FrameTable {
-  std::vector<Frame> frames;  // stamps strictly increasing
+  std::vector<Frame> frames;  // as the file has them; `order` mends their stamps
   std::vector<int> lines;     // of each frame, in the file
+  FrameOrder order;
 };
 Result<FrameTable> ReadFrameTable(const std::string& file);
 

@@ -119,6 +119,8 @@ Status ReadCamera(const fs::path& cam, Recording* recording) {
     if (Status status = AddFramesOfTables(files, recording); !status) return status;
   }
   if (Status frames = CheckFrames(cam.string(), recording->frames); !frames) return frames;
+  const std::string& frames_of = files.data.empty() ? files.video : files.data;
+  if (Status mended = table.order.Mend(frames_of, recording); !mended) return mended;
   NoteRate(cam, yaml->rate_hz, MedianInterval(recording->frames), recording);
   if (recording->camera.width_px == 0 && (!files.tracks.empty() || !files.matches.empty())) {
     return BadInput(Concat(files.tracks.empty() ? files.matches : files.tracks,

@@ -9,6 +9,7 @@
 
 #include "frontend/readers/add_pictures.h"
 #include "frontend/readers/csv_reader.h"
+#include "frontend/readers/frame_order.h"
 #include "frontend/readers/inside_folder.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sample_rows.h"
@@ -157,9 +158,9 @@ Result<Recording> ReadGcsv(const std::string& path) {
   if (Status pictures = AddVideo(*video, log, log, &recording); !pictures) {
     return tl::unexpected(pictures.error());
   }
-  if (Status frames = CheckFrames(*video, recording.frames); !frames) {
-    return tl::unexpected(frames.error());
-  }
+  Status frames = CheckFrames(*video, recording.frames);
+  if (frames) frames = FrameOrder().Mend(*video, &recording);
+  if (!frames) return tl::unexpected(frames.error());
 
   const auto readout_ms = HeadNumber(log, *head, "frame_readout_time", 0.0, /*positive=*/false);
   const auto direction = HeadNumber(log, *head, "frame_readout_direction", 0.0, /*positive=*/false);

@@ -9,6 +9,7 @@
 
 #include "core/robust_statistics.h"
 #include "core/time.h"
+#include "frontend/readers/frame_order.h"
 #include "frontend/readers/gpmf.h"
 #include "frontend/readers/mp4_box.h"
 #include "frontend/readers/recording_checks.h"
@@ -287,6 +288,9 @@ Result<Recording> ReadGoPro(const std::string& file) {
       gyro->orientation_stated ? " (ORIN)" : " (the model's; the file does not say)"));
   NoteGyroClock(*gyro, &recording);
   SetExposures(CollectScalars(*payloads, "SHUT"), &recording);
+  if (Status mended = FrameOrder().Mend(file, &recording); !mended) {
+    return tl::unexpected(mended.error());
+  }
   SetStabilisation(settings.texts, &recording);
   std::vector<double> readouts_ms = CollectScalars(*payloads, "SROT");
   if (settings.readout_ms) readouts_ms = {*settings.readout_ms};

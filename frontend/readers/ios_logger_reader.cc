@@ -29,14 +29,14 @@ Status ReadAccel(const std::string& file, Recording* recording) {
   columns.time_unit_s = 1.0;
   columns.accel = {1, 2, 3};
   columns.accel_map *= -kStandardGravity;
-  return ReadAccelRows(columns, &csv, recording);
+  return ReadAccelRows(file, columns, &csv, recording);
 }
 
-Status ReadFrames(const std::string& file, Recording* recording) {
+Status ReadFrames(const std::string& file, FrameOrder* order, Recording* recording) {
   CsvReader csv(file, {"time [s]", "number", "fx [px]", "fy [px]", "cx [px]", "cy [px]"}, {2, 6});
   std::vector<double> fx, fy, cx, cy;
   while (csv.NextRow()) {
-    AddFrame(csv.Time(0, 1.0), &csv, recording);
+    AddFrame(csv.Time(0, 1.0), csv, order, recording);
     if (csv.width() < 6) continue;
     fx.push_back(csv.Number(2));
     fy.push_back(csv.Number(3));
@@ -53,11 +53,11 @@ Status ReadFrames(const std::string& file, Recording* recording) {
   return {};
 }
 
-Status ReadPoses(const std::string& file, Recording* recording) {
+Status ReadPoses(const std::string& file, FrameOrder* order, Recording* recording) {
   CsvReader csv(file, {"time [s]", "x [m]", "y [m]", "z [m]", "qw", "qx", "qy", "qz"}, {8});
   recording->frames.clear();
   while (csv.NextRow()) {
-    AddFrame(csv.Time(0, 1.0), &csv, recording);
+    AddFrame(csv.Time(0, 1.0), csv, order, recording);
     recording->q_cam_world.push_back(ReadQuaternion(4, {5, 6, 7}, &csv).conjugate());
   }
   return csv.status();
@@ -85,9 +85,11 @@ Result<Recording> ReadIosLogger(const std::string& folder) {
   Status status = ReadGyro(file("Gyro.txt"), &recording);
   if (status && exists("Accel.txt")) status = ReadAccel(file("Accel.txt"), &recording);
   const std::string frames = file(has_video ? "Frames.txt" : "ARposes.txt");
-  if (status) status = has_video ? ReadFrames(frames, &recording) : ReadPoses(frames, &recording);
+  FrameOrder order;
+  if (status) status = (has_video ? ReadFrames : ReadPoses)(frames, &order, &recording);
   if (status) status = CheckFrames(frames, recording.frames);
   if (status && has_video) status = AddVideo(file("Frames.m4v"), frames, frames, &recording);
+  if (status) status = order.Mend(frames, &recording);
   if (!status) return tl::unexpected(status.error());
   if (!has_video) {
     recording.notes.push_back(folder +

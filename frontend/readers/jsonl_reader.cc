@@ -9,6 +9,7 @@
 
 #include "core/robust_statistics.h"
 #include "frontend/readers/add_pictures.h"
+#include "frontend/readers/frame_order.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
 
@@ -46,8 +47,11 @@ class Lines {
       if (Status status = Take(object); !status) return status;
     }
     SetCamera();
-    return gyro_.Finish(file_);
+    Status status = gyro_.Finish(file_);
+    if (status) MendAccel(file_, recording_);
+    return status;
   }
+  const FrameOrder& order() const { return order_; }
 
  private:
   std::string Place() const { return Concat(file_, ":", line_); }
@@ -89,10 +93,6 @@ class Lines {
       gyro_.Add({*stamp_ns, value}, std::nullopt, [this] { return Place(); });
       return {};
     }
-    if (!recording_->accel.empty()) {
-      const auto wrong = NotIncreasing(recording_->accel.back().stamp_ns, *stamp_ns);
-      if (wrong) return Wrong(*wrong);
-    }
     recording_->accel.push_back({*stamp_ns, value});
     return {};
   }
@@ -101,14 +101,11 @@ class Lines {
     const std::optional<double> own_s = Number(json, "time");
     const auto stamp_ns = Stamp(own_s ? own_s : time_s);
     if (!stamp_ns) return tl::unexpected(stamp_ns.error());
-    std::vector<Frame>& frames = recording_->frames;
-    if (!frames.empty()) {
-      const auto wrong = NotIncreasing(frames.back().stamp_ns, *stamp_ns);
-      if (wrong) return Wrong(*wrong);
-    }
-    Frame& frame = frames.emplace_back();
+    Frame frame;
     frame.stamp_ns = *stamp_ns;
     frame.exposure_s = Number(json, "exposureTimeSeconds").value_or(frame.exposure_s);
+    order_.Add(
+        std::move(frame), [this] { return Place(); }, &recording_->frames);
     const auto camera = json.find("cameraParameters");
     if (!json.is_object() || camera == json.end()) return {};
     const auto fx = Number(*camera, "focalLengthX"), fy = Number(*camera, "focalLengthY");
@@ -134,6 +131,7 @@ class Lines {
   const std::string& file_;
   Recording* const recording_;
   GyroCollector gyro_;
+  FrameOrder order_;
   int line_ = 0;
   std::vector<double> fx_, fy_, cx_, cy_;
 };
@@ -156,9 +154,11 @@ Result<Recording> ReadJsonl(const std::string& folder) {
   }
   Recording recording;
   recording.path = folder;
-  Status status = Lines(file, &recording).Read();
+  Lines lines(file, &recording);
+  Status status = lines.Read();
   if (status) status = CheckFrames(file, recording.frames);
   if (status) status = AddVideo(video, file, file, &recording);
+  if (status) status = lines.order().Mend(file, &recording);
   if (!status) return tl::unexpected(status.error());
   NoteClocks(&recording);
   return recording;

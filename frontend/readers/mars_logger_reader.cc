@@ -49,7 +49,9 @@ struct Capture {
   double exposure_s = 0.0, focal_px = 0.0, readout_s = 0.0;
 };
 
-Result<std::map<int64_t, Capture>> ReadCaptures(const std::string& file) {
+// Also makes a frame of each.
+Result<std::map<int64_t, Capture>> ReadCaptures(const std::string& file, FrameOrder* order,
+                                                Recording* recording) {
   std::map<int64_t, Capture> captures;
   CsvReader csv = CsvReader::ByName(file);
   const TimeColumn time = FindTime("Timestamp", &csv);
@@ -75,19 +77,17 @@ Result<std::map<int64_t, Capture>> ReadCaptures(const std::string& file) {
     capture.focal_px = number(focal);
     capture.exposure_s = exposure ? 1e-9 * number(*exposure) : nan;
     capture.readout_s = readout ? 1e-9 * number(*readout) : nan;
-    if (csv.status() && !captures.empty() && stamp_ns <= captures.rbegin()->first) {
-      csv.Fail(*NotIncreasing(captures.rbegin()->first, stamp_ns));
-    }
-    captures[stamp_ns] = capture;
+    captures.emplace(stamp_ns, capture);
+    AddFrame(stamp_ns, csv, order, recording);
   }
   if (!csv.status()) return tl::unexpected(csv.status().error());
   return captures;
 }
 
-Status ReadFrameStamps(const std::string& file, Recording* recording) {
+Status ReadFrameStamps(const std::string& file, FrameOrder* order, Recording* recording) {
   CsvReader csv = CsvReader::ByName(file);
   const TimeColumn time = FindTime("Frame timestamp", &csv);
-  while (csv.NextRow()) AddFrame(csv.Time(time.index, time.unit_s), &csv, recording);
+  while (csv.NextRow()) AddFrame(csv.Time(time.index, time.unit_s), csv, order, recording);
   return csv.status();
 }
 
@@ -157,21 +157,21 @@ Result<Recording> ReadMarsLogger(const std::string& folder) {
   recording.path = folder;
   Status status = ReadImu((fs::path(folder) / "gyro_accel.csv").string(), &recording);
   std::map<int64_t, Capture> captures;
+  FrameOrder order;
   if (status && !metadata.empty()) {
-    auto read = ReadCaptures(metadata);
+    auto read = ReadCaptures(metadata, &order, &recording);
     if (!read) return tl::unexpected(read.error());
     captures = std::move(*read);
   }
   if (status && !stamps.empty()) {
-    status = ReadFrameStamps(stamps, &recording);
-  } else {
-    for (const auto& [stamp_ns, capture] : captures) {
-      recording.frames.emplace_back().stamp_ns = stamp_ns;
-    }
+    recording.frames.clear();  // those of the captures, which may be more than the pictures
+    order = {};
+    status = ReadFrameStamps(stamps, &order, &recording);
   }
   const std::string& frames_file = stamps.empty() ? metadata : stamps;
   if (status) status = CheckFrames(frames_file, recording.frames);
   if (status) status = AddVideo(video, frames_file, frames_file, &recording);
+  if (status) status = order.Mend(frames_file, &recording);
   if (!status) return tl::unexpected(status.error());
   if (!captures.empty()) AddCaptures(captures, &recording);
   NoteClocks(&recording);

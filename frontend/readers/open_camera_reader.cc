@@ -55,7 +55,7 @@ std::optional<Logs> FindLogs(const std::string& folder) {
   return std::nullopt;
 }
 
-Status ReadGyro(const std::string& file, Recording* recording) {
+Status ReadOpenCameraGyro(const std::string& file, Recording* recording) {
   CsvReader csv(file, {"x [rad/s]", "y [rad/s]", "z [rad/s]", "timestamp [ns]"}, {4});
   SampleColumns columns;
   columns.time = 3;
@@ -63,12 +63,12 @@ Status ReadGyro(const std::string& file, Recording* recording) {
   return ReadGyroRows(file, columns, &csv, recording);
 }
 
-Status ReadAccel(const std::string& file, Recording* recording) {
+Status ReadOpenCameraAccel(const std::string& file, Recording* recording) {
   CsvReader csv(file, {"x [m/s^2]", "y [m/s^2]", "z [m/s^2]", "timestamp [ns]"}, {4});
   SampleColumns columns;
   columns.time = 3;
   columns.accel = {0, 1, 2};
-  return ReadAccelRows(columns, &csv, recording);
+  return ReadAccelRows(file, columns, &csv, recording);
 }
 
 }  // namespace
@@ -87,14 +87,15 @@ Result<Recording> ReadOpenCamera(const std::string& folder) {
   }
   Recording recording;
   recording.path = folder;
-  Status status = ReadGyro(logs->gyro, &recording);
-  if (status && !logs->accel.empty()) status = ReadAccel(logs->accel, &recording);
+  Status status = ReadOpenCameraGyro(logs->gyro, &recording);
+  if (status && !logs->accel.empty()) status = ReadOpenCameraAccel(logs->accel, &recording);
   if (!status) return tl::unexpected(status.error());
   Result<FrameTable> table = ReadFrameTable(logs->stamps);
   if (!table) return tl::unexpected(table.error());
   recording.frames = std::move(table->frames);
   status = CheckFrames(logs->stamps, recording.frames);
   if (status) status = AddVideo(video, logs->stamps, logs->stamps, &recording);
+  if (status) status = table->order.Mend(logs->stamps, &recording);
   if (!status) return tl::unexpected(status.error());
   NoteClocks(&recording);
   return recording;

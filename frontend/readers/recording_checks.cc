@@ -16,28 +16,6 @@ constexpr double kGyroFullScaleRadS = 2000.0 * M_PI / 180.0;  // of most MEMS gy
 constexpr double kFastestGyroHz = 100e3;
 constexpr double kFastestCameraHz = 100e3;
 
-// Indices of the longest sequence of samples whose stamps do not decrease (patience sorting). From
-// the end, so that of two samples that exclude each other the earlier stays.
-std::vector<size_t> LongestNonDecreasing(const std::vector<GyroSample>& samples) {
-  std::vector<size_t> heads, after(samples.size());  // first of the best sequence of each length
-  for (size_t i = samples.size(); i-- > 0;) {
-    const auto place = std::upper_bound(
-        heads.begin(), heads.end(), samples[i].stamp_ns,
-        [&](int64_t stamp_ns, size_t head) { return stamp_ns > samples[head].stamp_ns; });
-    after[i] = place == heads.begin() ? i : *std::prev(place);
-    if (place == heads.end()) {
-      heads.push_back(i);
-    } else {
-      *place = i;
-    }
-  }
-  std::vector<size_t> sequence;
-  for (size_t at = heads.back(); sequence.size() < heads.size(); at = after[at]) {
-    sequence.push_back(at);
-  }
-  return sequence;
-}
-
 // Two sensors whose samples take turns: neighbours differ by the sensors' biases and axes, samples
 // two rows apart by the motion only. Of one sensor, samples farther apart differ more.
 bool SamplesTakeTurns(const std::vector<GyroSample>& samples) {
@@ -55,6 +33,28 @@ bool SamplesTakeTurns(const std::vector<GyroSample>& samples) {
 }
 
 }  // namespace
+
+// Patience sorting, from the end.
+std::vector<size_t> LongestNonDecreasing(const std::vector<int64_t>& stamps_ns) {
+  if (stamps_ns.empty()) return {};
+  std::vector<size_t> heads, after(stamps_ns.size());  // first of the best sequence of each length
+  for (size_t i = stamps_ns.size(); i-- > 0;) {
+    const auto place =
+        std::upper_bound(heads.begin(), heads.end(), stamps_ns[i],
+                         [&](int64_t stamp_ns, size_t head) { return stamp_ns > stamps_ns[head]; });
+    after[i] = place == heads.begin() ? i : *std::prev(place);
+    if (place == heads.end()) {
+      heads.push_back(i);
+    } else {
+      *place = i;
+    }
+  }
+  std::vector<size_t> sequence;
+  for (size_t at = heads.back(); sequence.size() < heads.size(); at = after[at]) {
+    sequence.push_back(at);
+  }
+  return sequence;
+}
 
 void AddFault(const std::string& name, int count, const std::string& finding,
               Recording* recording) {
@@ -74,7 +74,11 @@ void GyroCollector::Add(const GyroSample& sample, const std::optional<Eigen::Vec
       return;
     }
     std::optional<std::string>& first = equal ? equal_stamps_ : disorder_;
-    if (!first) first = place() + ": " + *NotIncreasing(last.stamp_ns, sample.stamp_ns);
+    if (!first) {
+      first = Concat(place(), ": timestamp ", sample.stamp_ns,
+                     equal ? " repeats with other values, after " : " goes back, after ",
+                     last.stamp_ns, "; expected strictly increasing stamps");
+    }
   }
   gyro.push_back(sample);
   if (accel_m_s2) recording_->accel.push_back({sample.stamp_ns, *accel_m_s2});
@@ -105,15 +109,14 @@ int DropRepeatedStamps(Recording* recording) {
 Status GyroCollector::MendOrder(const std::string& file) {
   std::vector<GyroSample>& gyro = recording_->gyro;
   const size_t all = gyro.size();
-  const auto too_many = [&](size_t lost) { return 20 * lost > all; };
   const auto refuse = [&](const std::string& first, size_t lost, const char* likely) {
     return BadInput(
         Concat(first, " (", lost, " of ", all, " samples have such stamps", likely, ")"));
   };
   if (disorder_) {
-    const std::vector<size_t> kept = LongestNonDecreasing(gyro);
+    const std::vector<size_t> kept = LongestNonDecreasing(StampsOf(gyro));
     const size_t lost = all - kept.size();
-    if (too_many(lost)) {
+    if (TooManyLost(lost, all)) {
       return refuse(*disorder_, lost, ": two streams in one file have to be separated first");
     }
     Keep(kept);
@@ -128,16 +131,33 @@ Status GyroCollector::MendOrder(const std::string& file) {
                            "of one gyro"));
   }
   if (!equal_stamps_) return {};
-  std::vector<int64_t> stamps_ns;
-  for (const GyroSample& sample : gyro) stamps_ns.push_back(sample.stamp_ns);
-  if (FindStampClock(stamps_ns).report.kind == StampKind::kArrival) return {};
+  if (FindStampClock(StampsOf(gyro)).report.kind == StampKind::kArrival) return {};
   const size_t lost = static_cast<size_t>(DropRepeatedStamps(recording_));
-  if (too_many(lost)) return refuse(*equal_stamps_, lost, "");
+  if (TooManyLost(lost, all)) return refuse(*equal_stamps_, lost, "");
   AddFault(
       "stamps_repeat", static_cast<int>(lost),
       Concat(*equal_stamps_, "; the first sample of each stamp is used, ", lost, " are left out"),
       recording_);
   return {};
+}
+
+void MendAccel(const std::string& file, Recording* recording) {
+  std::vector<AccelSample>& accel = recording->accel;
+  const size_t all = accel.size();
+  std::vector<AccelSample> kept;
+  for (const size_t i : LongestNonDecreasing(StampsOf(accel))) {
+    if (kept.empty() || accel[i].stamp_ns > kept.back().stamp_ns) kept.push_back(accel[i]);
+  }
+  const size_t lost = all - kept.size();
+  if (lost == 0) return;
+  const bool useless = TooManyLost(lost, all);
+  if (useless) kept.clear();
+  accel = std::move(kept);
+  AddFault(
+      "accel_stamps", static_cast<int>(lost),
+      Concat(file, ": ", lost, " of ", all, " accelerations have stamps that repeat or go back; ",
+             useless ? "the accelerometer is not used" : "they are left out"),
+      recording);
 }
 
 Status GyroCollector::Finish(const std::string& file) {
@@ -171,13 +191,6 @@ Status CheckRateUnit(const std::string& file, const std::vector<GyroSample>& gyr
   return BadInput(Concat(file, ": angular rates reach ", *high,
                          ", and in rad/s most gyros end at 35: looks like deg/s; the columns must "
                          "be rad/s; put [deg s^-1] in the header to have them converted"));
-}
-
-std::optional<std::string> NotIncreasing(int64_t last_ns, int64_t stamp_ns) {
-  if (stamp_ns > last_ns) return std::nullopt;
-  return Concat("timestamp ", stamp_ns,
-                stamp_ns == last_ns ? " repeats with other values, after " : " goes back, after ",
-                last_ns, "; expected strictly increasing stamps");
 }
 
 Status CheckFrames(const std::string& where, const std::vector<Frame>& frames) {

@@ -17,6 +17,23 @@ namespace camgyro {
 // Something was wrong with the data and has been mended: counted, and noted for the user.
 void AddFault(const std::string& name, int count, const std::string& finding, Recording* recording);
 
+// Of samples or frames, in their order.
+template <typename Stamped>
+std::vector<int64_t> StampsOf(const std::vector<Stamped>& items) {
+  std::vector<int64_t> stamps_ns;
+  stamps_ns.reserve(items.size());
+  for (const Stamped& item : items) stamps_ns.push_back(item.stamp_ns);
+  return stamps_ns;
+}
+
+// Indices of the longest sequence of stamps that does not decrease; of two that exclude each other
+// the earlier stays.
+std::vector<size_t> LongestNonDecreasing(const std::vector<int64_t>& stamps_ns);
+
+// A repair may cost a twentieth of the samples or frames. Where more are out of order, something
+// else is wrong, as two streams in one file.
+inline bool TooManyLost(size_t lost, size_t all) { return 20 * lost > all; }
+
 // Collects gyro samples as a reader comes upon them, in the file's order, and decides on those
 // whose stamps are out of order.
 class GyroCollector {
@@ -48,6 +65,11 @@ class GyroCollector {
   std::optional<std::string> equal_stamps_;  // the first that repeats with other values
 };
 
+// Leaves out accelerations of `file` whose stamps repeat or step back, as GyroCollector does, and
+// records them in the faults; where too many would be lost, all of them, since the calibration
+// needs none.
+void MendAccel(const std::string& file, Recording* recording);
+
 // Drops samples whose stamps are not after the one before, the accelerometer's with them if it has
 // the gyro's stamps. Returns how many of the gyro.
 int DropRepeatedStamps(Recording* recording);
@@ -55,9 +77,6 @@ int DropRepeatedStamps(Recording* recording);
 // Error if the 99th percentile of |w| is beyond the full scale of gyros, 2000 deg/s: the rates are
 // in deg/s then. Slow motion in deg/s passes; only the camera can tell there.
 Status CheckRateUnit(const std::string& file, const std::vector<GyroSample>& gyro);
-
-// What is wrong with a stamp that does not come after `last_ns`; nothing if it does.
-std::optional<std::string> NotIncreasing(int64_t last_ns, int64_t stamp_ns);
 
 // Error if there are fewer than two frames, or their stamps cannot be nanoseconds.
 Status CheckFrames(const std::string& where, const std::vector<Frame>& frames);

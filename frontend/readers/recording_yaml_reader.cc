@@ -140,12 +140,12 @@ Status ReadAccel(Section section, Recording* recording) {
       {{"m/s^2", 1.0}, {"g", kStandardGravity}, {"-m/s^2", -1.0}, {"-g", -kStandardGravity}},
       "m/s^2");
   if (Status good = section.Check(csv); !good) return good;
-  return ReadAccelRows(columns, &csv, recording);
+  return ReadAccelRows(file, columns, &csv, recording);
 }
 
 // The rows of the camera's table: stamps, names of images in `images`, exposures.
 Status ReadFrames(const std::string& file, const std::string& images, Section* section,
-                  Recording* recording) {
+                  FrameOrder* order, Recording* recording) {
   CsvReader csv = section->Table(file);
   SampleColumns columns;
   section->Time(&csv, &columns);
@@ -156,7 +156,8 @@ Status ReadFrames(const std::string& file, const std::string& images, Section* s
   const size_t image = images.empty() ? 0 : section->Column(&csv, "image");
   if (Status good = section->Check(csv); !good) return good;
   while (csv.NextRow()) {
-    AddFrame(csv.Time(columns.time, columns.time_unit_s, columns.time_offset_ns), &csv, recording);
+    AddFrame(csv.Time(columns.time, columns.time_unit_s, columns.time_offset_ns), csv, order,
+             recording);
     Frame& frame = recording->frames.back();
     if (has_exposure) frame.exposure_s = exposure_unit_s * csv.Number(exposure);
     if (images.empty()) continue;
@@ -191,13 +192,18 @@ Status ReadCamera(Section section, Recording* recording) {
     recording->camera.q_gyro_cam = yaml->q_body_sensor;
   }
   Status status;
-  if (!table.empty()) status = ReadFrames(table, images, &section, recording);
+  FrameOrder order;
+  if (!table.empty()) status = ReadFrames(table, images, &section, &order, recording);
   if (!status) return status;
-  if (!video.empty()) return AddVideo(video, table, sensor, recording);
-  const std::string& first = recording->frames.front().image_file;
-  const Result<cv::Mat> image = ReadGrayImage(first);
-  if (!image) return tl::unexpected(image.error());
-  return SetResolution(image->cols, image->rows, first, sensor, &recording->camera);
+  if (!video.empty()) {
+    status = AddVideo(video, table, sensor, recording);
+  } else {
+    const std::string& first = recording->frames.front().image_file;
+    const Result<cv::Mat> image = ReadGrayImage(first);
+    if (!image) return tl::unexpected(image.error());
+    status = SetResolution(image->cols, image->rows, first, sensor, &recording->camera);
+  }
+  return status ? order.Mend(table.empty() ? video : table, recording) : status;
 }
 
 // What the section `bag` names.

@@ -14,14 +14,6 @@ namespace {
 constexpr double kWorseForetold = 1.05;
 
 template <typename Stamped>
-std::vector<int64_t> StampsOf(const std::vector<Stamped>& items) {
-  std::vector<int64_t> stamps_ns;
-  stamps_ns.reserve(items.size());
-  for (const Stamped& item : items) stamps_ns.push_back(item.stamp_ns);
-  return stamps_ns;
-}
-
-template <typename Stamped>
 void SetStamps(const std::vector<int64_t>& stamps_ns, std::vector<Stamped>* items) {
   for (size_t i = 0; i < items->size(); ++i) (*items)[i].stamp_ns = stamps_ns[i];
 }
@@ -64,9 +56,13 @@ void RepairStamps(StampsMode mode, Recording* recording) {
   recording->gyro_stamps = report;
 
   recording->camera_stamps = FindStampClock(StampsOf(recording->frames)).report;
-  if (recording->camera_stamps->kind != StampKind::kMeasured) {
-    recording->notes.push_back("frame stamps are " + DescribeStamps(*recording->camera_stamps));
+  StampReport& frames = *recording->camera_stamps;
+  const bool own_times = mode != StampsMode::kRecorded && frames.kind == StampKind::kArrival;
+  if (frames.kind != StampKind::kMeasured) {
+    recording->notes.push_back("frame stamps are " + DescribeStamps(frames) +
+                               (own_times ? "; each frame has a time of its own in the fit" : ""));
   }
+  frames.repaired = own_times;
 }
 
 }  // namespace camgyro

@@ -14,7 +14,8 @@ enum class StampsMode {
 
 // Sets gyro_stamps and camera_stamps of the recording, and with them the stamps of gyro and
 // accelerometer, strictly increasing afterwards; notes what was found. Frames keep their stamps:
-// how late each of them is, their pictures tell better (effect frame_stamp_jitter).
+// how late each of them is, their pictures tell better. Where frame stamps are clearly times of
+// arrival, camera_stamps->repaired has the fit begin with frame_stamp_jitter (not if kRecorded).
 void RepairStamps(StampsMode mode, Recording* recording);
 
 }  // namespace camgyro

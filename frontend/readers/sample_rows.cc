@@ -1,6 +1,7 @@
 #include "frontend/readers/sample_rows.h"
 
 #include <cmath>
+#include <utility>
 
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
@@ -31,12 +32,11 @@ Eigen::Quaterniond ReadQuaternion(size_t w, const std::array<size_t, 3>& xyz, Cs
   return csv->status() ? q.normalized() : Eigen::Quaterniond::Identity();
 }
 
-void AddFrame(int64_t stamp_ns, CsvReader* csv, Recording* recording) {
-  std::vector<Frame>& frames = recording->frames;
-  if (csv->status() && !frames.empty()) {
-    if (const auto wrong = NotIncreasing(frames.back().stamp_ns, stamp_ns)) csv->Fail(*wrong);
-  }
-  frames.emplace_back().stamp_ns = stamp_ns;
+void AddFrame(int64_t stamp_ns, const CsvReader& csv, FrameOrder* order, Recording* recording) {
+  Frame frame;
+  frame.stamp_ns = stamp_ns;
+  order->Add(
+      std::move(frame), [&csv] { return csv.Place(); }, &recording->frames);
 }
 
 Status ReadGyroRows(const std::string& file, const SampleColumns& columns, CsvReader* csv,
@@ -54,17 +54,15 @@ Status ReadGyroRows(const std::string& file, const SampleColumns& columns, CsvRe
   return gyro.Finish(file);
 }
 
-Status ReadAccelRows(const SampleColumns& columns, CsvReader* csv, Recording* recording) {
+Status ReadAccelRows(const std::string& file, const SampleColumns& columns, CsvReader* csv,
+                     Recording* recording) {
   while (csv->NextRow()) {
     const int64_t stamp_ns = ReadStamp(columns, csv);
     const Eigen::Vector3d accel = columns.accel_map * Vector(*columns.accel, csv);
-    if (csv->status() && !recording->accel.empty()) {
-      const auto wrong = NotIncreasing(recording->accel.back().stamp_ns, stamp_ns);
-      if (wrong) csv->Fail(*wrong);
-    }
-    if (!csv->status()) break;
+    if (!csv->status()) return csv->status();
     recording->accel.push_back({stamp_ns, accel});
   }
+  if (csv->status()) MendAccel(file, recording);
   return csv->status();
 }
 

@@ -13,6 +13,7 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "frontend/readers/csv_reader.h"
+#include "frontend/readers/frame_order.h"
 
 namespace camgyro {
 
@@ -39,11 +40,12 @@ Status ReadGyroRows(const std::string& file, const SampleColumns& columns, CsvRe
 // The unit quaternion of the current row; fails in `csv` if its norm is off 1 by more than 0.001.
 Eigen::Quaterniond ReadQuaternion(size_t w, const std::array<size_t, 3>& xyz, CsvReader* csv);
 
-// Appends a frame of the current row; fails in `csv` if its stamp is not after the last one's.
-void AddFrame(int64_t stamp_ns, CsvReader* csv, Recording* recording);
+// Appends a frame of the current row.
+void AddFrame(int64_t stamp_ns, const CsvReader& csv, FrameOrder* order, Recording* recording);
 
-// Reads all rows of a table that has accelerations only, in columns.accel.
-Status ReadAccelRows(const SampleColumns& columns, CsvReader* csv, Recording* recording);
+// Reads all rows of a table that has accelerations only, in columns.accel; MendAccel on them.
+Status ReadAccelRows(const std::string& file, const SampleColumns& columns, CsvReader* csv,
+                     Recording* recording);
 
 }  // namespace camgyro
 

@@ -9,6 +9,7 @@
 
 #include "frontend/readers/add_pictures.h"
 #include "frontend/readers/csv_reader.h"
+#include "frontend/readers/frame_order.h"
 #include "frontend/readers/image_file.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sample_rows.h"
@@ -30,7 +31,7 @@ std::string GyroFile(const std::string& folder) {
   return "";
 }
 
-Status ReadGyro(const std::string& file, Recording* recording) {
+Status ReadSensorLoggerGyro(const std::string& file, Recording* recording) {
   CsvReader csv = CsvReader::ByName(file);
   SampleColumns columns;
   columns.time = csv.Column({"time"});
@@ -39,12 +40,12 @@ Status ReadGyro(const std::string& file, Recording* recording) {
   return ReadGyroRows(file, columns, &csv, recording);
 }
 
-Status ReadAccel(const std::string& file, Recording* recording) {
+Status ReadSensorLoggerAccel(const std::string& file, Recording* recording) {
   CsvReader csv = CsvReader::ByName(file);
   SampleColumns columns;
   columns.time = csv.Column({"time"});
   columns.accel = VectorColumns({"x", "y", "z"}, &csv);
-  return ReadAccelRows(columns, &csv, recording);
+  return ReadAccelRows(file, columns, &csv, recording);
 }
 
 // Files of Camera/ whose name is a number of milliseconds, by that number.
@@ -101,11 +102,13 @@ bool IsSensorLogger(const std::string& folder) { return !GyroFile(folder).empty(
 Result<Recording> ReadSensorLogger(const std::string& folder) {
   Recording recording;
   recording.path = folder;
-  Status status = ReadGyro(GyroFile(folder), &recording);
+  Status status = ReadSensorLoggerGyro(GyroFile(folder), &recording);
   const fs::path accel = fs::path(folder) / "TotalAcceleration.csv";
-  if (status && fs::is_regular_file(accel)) status = ReadAccel(accel.string(), &recording);
+  if (status && fs::is_regular_file(accel))
+    status = ReadSensorLoggerAccel(accel.string(), &recording);
   if (status) status = AddCamera(folder, &recording);
   if (status) status = CheckFrames(folder, recording.frames);
+  if (status) status = FrameOrder().Mend((fs::path(folder) / "Camera").string(), &recording);
   if (!status) return tl::unexpected(status.error());
   NoteClocks(&recording);
   return recording;

@@ -38,14 +38,14 @@ Status ReadImu(const std::string& file, Recording* recording) {
   return {};
 }
 
-Status ReadOdometry(const std::string& file, Recording* recording) {
+Status ReadOdometry(const std::string& file, FrameOrder* order, Recording* recording) {
   CsvReader csv = CsvReader::ByName(file);
   const size_t time = csv.Column({"timestamp"});
   const size_t w = csv.Column({"qw"});
   const auto xyz = VectorColumns({"qx", "qy", "qz"}, &csv);
   if (!csv.status()) return csv.status();
   while (csv.NextRow()) {
-    AddFrame(csv.Time(time, 1.0), &csv, recording);
+    AddFrame(csv.Time(time, 1.0), csv, order, recording);
     const Eigen::Quaterniond q_world_cam = ReadQuaternion(w, xyz, &csv);
     recording->q_cam_world.push_back(q_world_cam.conjugate());
   }
@@ -80,7 +80,8 @@ Result<Recording> ReadStrayScanner(const std::string& folder) {
   Recording recording;
   recording.path = folder;
   Status status = ReadImu(file("imu.csv"), &recording);
-  if (status) status = ReadOdometry(file("odometry.csv"), &recording);
+  FrameOrder order;
+  if (status) status = ReadOdometry(file("odometry.csv"), &order, &recording);
   if (status) status = CheckFrames(file("odometry.csv"), recording.frames);
   if (status && fs::is_regular_file(file("camera_matrix.csv"))) {
     status = ReadCameraMatrix(file("camera_matrix.csv"), &recording.camera);
@@ -91,6 +92,7 @@ Result<Recording> ReadStrayScanner(const std::string& folder) {
   } else if (status) {
     recording.notes.push_back(folder + ": has no rgb.mp4; the attitudes of odometry.csv are used");
   }
+  if (status) status = order.Mend(file("odometry.csv"), &recording);
   if (!status) return tl::unexpected(status.error());
   NoteClocks(&recording);
   return recording;

@@ -87,10 +87,6 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
                            packets, " were found whole"));
   }
   std::sort(result.stamps_ns.begin(), result.stamps_ns.end());  // packets come in coding order
-  const auto repeated = std::adjacent_find(result.stamps_ns.begin(), result.stamps_ns.end());
-  if (repeated != result.stamps_ns.end()) {
-    return BadInput(Concat(file, ": two frames have the stamp ", *repeated, " ns"));
-  }
   return result;
 }
 

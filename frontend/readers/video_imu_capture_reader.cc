@@ -14,6 +14,7 @@
 
 #include "core/robust_statistics.h"
 #include "frontend/readers/add_pictures.h"
+#include "frontend/readers/frame_order.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
 #include "video_imu_capture.pb.h"
@@ -152,10 +153,6 @@ Status MergeFrames(const std::string& file, const std::vector<video_imu::FrameIn
       frames[i].stamp_ns += shift_ns;
       ++missing;
     }
-    if (i == 0) continue;
-    if (const auto wrong = NotIncreasing(frames[i - 1].stamp_ns, frames[i].stamp_ns)) {
-      return BadInput(Concat(file, ": picture ", i, ": ", *wrong));
-    }
   }
   if (missing > 0) {
     recording->notes.push_back(Concat(file, ": has no stamps for ", missing, " of ", frames.size(),
@@ -182,6 +179,7 @@ Result<Recording> ReadVideoImuCapture(const std::string& folder) {
   if (status) status = AddVideo(video, meta, meta, &recording);
   if (status) status = MergeFrames(meta, infos, &recording);
   if (status) status = CheckFrames(meta, recording.frames);
+  if (status) status = FrameOrder().Mend(meta, &recording);
   if (!status) return tl::unexpected(status.error());
   NoteClocks(&recording);
   return recording;

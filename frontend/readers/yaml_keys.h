@@ -20,7 +20,7 @@ namespace camgyro {
 // The keys of one map of a file. The first error sticks, as in CsvReader.
 class YamlKeys {
  public:
-  YamlKeys(std::string file, YAML::Node root) : file_(std::move(file)), root_(std::move(root)) {}
+  YamlKeys(std::string file, const YAML::Node& root) : file_(std::move(file)), root_(root) {}
 
   const Status& status() const { return status_; }
 

@@ -15,7 +15,7 @@
 #include "estimator/window/sliding_window.h"
 #include "frontend/camera_rotations.h"
 #include "frontend/readers/repair_stamps.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {

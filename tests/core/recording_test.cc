@@ -24,6 +24,37 @@ TEST(Recording, PairsHoldTheTracksSeenInBothFrames) {
   EXPECT_TRUE(PairsFromTracks(tracks, 3).empty());
 }
 
+TEST(Recording, FramesAreLeftOutWithAllThatTheyHave) {
+  Recording whole;
+  for (int i = 0; i < 5; ++i) {
+    whole.frames.emplace_back().stamp_ns = 10 * i;
+    whole.tracks.push_back({{i, {0.0, 0.0}}});
+    whole.q_cam_world.emplace_back(1.0, i, 0.0, 0.0);
+    if (i > 0) whole.matches.push_back({i - 1, i, {{{0.0, 0.0}, {1.0 * i, 0.0}}}});
+  }
+  Recording recording = whole;
+  LeaveOutFrames({1, 4}, /*repeats=*/false, &recording);
+  ASSERT_EQ(recording.frames.size(), 3u);
+  const size_t pictures[] = {0, 2, 3};
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(recording.PictureOf(i), pictures[i]);
+    EXPECT_EQ(recording.frames[i].stamp_ns, whole.frames[pictures[i]].stamp_ns);
+    EXPECT_EQ(recording.tracks[i][0].track_id, static_cast<int64_t>(pictures[i]));
+    EXPECT_EQ(recording.q_cam_world[i].x(), static_cast<double>(pictures[i]));
+  }
+  ASSERT_EQ(recording.matches.size(), 1u);  // of the frames 2 and 3
+  EXPECT_EQ(recording.matches[0].frame_a, 1);
+  EXPECT_EQ(recording.matches[0].frame_b, 2);
+
+  LeaveOutFrames({1}, /*repeats=*/true, &recording);  // counts on from what is left
+  ASSERT_EQ(recording.frames.size(), 2u);
+  EXPECT_EQ(recording.PictureOf(1), 3u);
+  ASSERT_EQ(recording.matches.size(), 1u);  // the frame before has the picture, too
+  EXPECT_EQ(recording.matches[0].frame_a, 0);
+  EXPECT_EQ(recording.matches[0].frame_b, 1);
+  EXPECT_EQ(recording.matches[0].matches[0].px_b.x(), 3.0);
+}
+
 TEST(Recording, MedianIntervalIgnoresAGap) {
   std::vector<Frame> frames(5);
   const int64_t stamps[] = {0, 33'000'000, 66'000'000, 1'000'000'000, 1'033'000'000};

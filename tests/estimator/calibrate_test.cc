@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 
 #include "core/usual_focal.h"
+#include "estimator/starting_point.h"
+#include "estimator/window/residuals/all_residuals.h"
 #include "frontend/camera_rotations.h"
 #include "tests/estimator/simulated_input.h"
 
@@ -121,6 +123,24 @@ TEST(CalibrateRecording, TakesAClockThatRunsFastIntoTheModel) {
   EXPECT_NEAR(report->online->effect_values[0], 8000.0, 100.0);
 }
 
+// Also of an effect that the start finds by itself.
+TEST(CalibrateRecording, RefusesEffectsOfResidualsThatKnowNone) {
+  const Simulated s = SimulateTracks(ShortScenario(1.0)).value();
+  CalibrateOptions options;
+  options.window.graph.residual = &ByTransfer();
+  options.given_start.emplace();
+  options.from = s.truth;
+  options.from->effects = std::make_shared<const EffectSet>(
+      MakeEffects("clock_skew", MakeEffectSetup(s.recording, s.truth)).value());
+  options.from->effect_values = Eigen::VectorXd::Zero(1);
+  const Result<CalibrationReport> report =
+      CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().kind, ErrorKind::kBadUsage);
+  EXPECT_THAT(report.error().message, ::testing::HasSubstr("clock_skew"));
+  EXPECT_THAT(report.error().message, ::testing::HasSubstr("--residual=plane"));
+}
+
 TEST(CalibrateRecording, RefusesARecordingThatDoesNotTurn) {
   Scenario scenario = ShortScenario(3.0);
   scenario.motion.rotation_rms_rad_s.setZero();
@@ -168,6 +188,27 @@ TEST(MakePrior, FollowsWhatTheFilesDeclare) {
 
   start.focal->determined = false;
   EXPECT_EQ(MakePrior(s.recording, start).mean.lens[kFocal], kUsualFocal * 720);
+}
+
+// Frame stamps that are times of arrival: frames have times of their own from the start on, unless
+// the residual or attitudes cannot have them.
+TEST(AddStartEffects, FreesTheTimesOfFramesThatAreStampedLate) {
+  Recording recording = SimulateTracks(ShortScenario(2.0)).value().recording;
+  const auto has_frame_times = [&](const PairResidual& residual) {
+    Calibration calibration;
+    EXPECT_TRUE(AddStartEffects(recording, {}, "", residual, &calibration));
+    return calibration.effects != nullptr && calibration.effects->frame_time_spread() >= 0;
+  };
+  EXPECT_FALSE(has_frame_times(ByPlane()));
+  recording.camera_stamps.emplace();
+  recording.camera_stamps->kind = StampKind::kArrival;
+  recording.camera_stamps->jitter_s = 3e-3;
+  EXPECT_FALSE(has_frame_times(ByPlane()));  // --stamps=recorded
+  recording.camera_stamps->repaired = true;
+  EXPECT_TRUE(has_frame_times(ByPlane()));
+  EXPECT_FALSE(has_frame_times(ByTransfer()));
+  recording.tracks.clear();
+  EXPECT_FALSE(has_frame_times(ByPlane()));
 }
 
 }  // namespace

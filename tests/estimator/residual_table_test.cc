@@ -82,7 +82,7 @@ TEST(ResidualTable, CorrectionTakesAShiftBack) {
 
 TEST(ResidualTable, OfTransfersIsNoiseAtTheTruthAndTakesAShiftBack) {
   Scene scene = MakeScene(/*noise_px=*/0.7, FarScenario(2.0));
-  scene.options.residual = ResidualKind::kSymmetricTransfer;
+  scene.options.residual = &ByTransfer();
   const auto rows =
       ComputeResiduals(scene.input, scene.input.pairs, scene.simulated.truth, 0.7, scene.options);
   ASSERT_GT(rows.size(), 1500u);
@@ -97,7 +97,7 @@ TEST(ResidualTable, OfTransfersIsNoiseAtTheTruthAndTakesAShiftBack) {
   EXPECT_NEAR(std::sqrt(sum_sq_px / static_cast<double>(rows.size())), 2.0 * 0.7, 0.05);
 
   scene = MakeScene(/*noise_px=*/0.0, FarScenario(2.0));
-  scene.options.residual = ResidualKind::kSymmetricTransfer;
+  scene.options.residual = &ByTransfer();
   scene.options.match_noise = MatchNoise::kSecondImage;
   std::vector<TimedPair> pairs = {scene.input.pairs[10]};
   const Eigen::Vector2d shift(0.3, -0.4);

@@ -10,7 +10,7 @@
 #include "core/so3.h"
 #include "estimator/window/estimation_input.h"
 #include "estimator/window/sliding_window.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 

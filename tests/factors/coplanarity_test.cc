@@ -97,14 +97,14 @@ TEST(CoplanarityPlane, ResidualIsTheDistanceFromTheEpipolarLineInSigmas) {
       slope[k] = Residuals(CoplanarityPlane(s.pair), s.Parameters())[i] / step;
       s.pair->matches[i].px_b = px;
     }
-    EXPECT_NEAR(slope.norm(), 1.0 / s.pair->sigma_px, 1e-3);
+    EXPECT_NEAR(slope.norm(), 1.0 / s.pair->sigma, 1e-3);
   }
 }
 
 TEST(CoplanarityPlane, NoiseHasUnitVarianceWhenBothImagesAreNoisy) {
   PairScene s = MakePairScene(5, 60);
   std::mt19937_64 generator(7);
-  std::normal_distribution<double> noise(0.0, s.pair->sigma_px);
+  std::normal_distribution<double> noise(0.0, s.pair->sigma);
   const auto exact = s.pair->matches;
   double sum_sq = 0.0;
   int count = 0;
@@ -239,9 +239,9 @@ TEST(CoplanarityDeterminant, IsZeroAtTheTruth) {
 
 TEST(CoplanarityDeterminant, NoiseHasUnitVariance) {
   PairScene s = MakePairScene(8, 60);
-  s.pair->sigma_px = 0.05;  // first-order propagation: noise small against parallax
+  s.pair->sigma = 0.05;  // first-order propagation: noise small against parallax
   std::mt19937_64 generator(9);
-  std::normal_distribution<double> noise(0.0, s.pair->sigma_px);
+  std::normal_distribution<double> noise(0.0, s.pair->sigma);
   const auto exact = s.pair->matches;
   double sum_sq = 0.0;
   int count = 0;

@@ -62,7 +62,7 @@ inline PairScene MakePairScene(
   s.pair->frame_a.stamp_s = 1.0;
   s.pair->frame_b.stamp_s = 1.0 + 1.0 / 30;
   s.pair->size_px << 752.0, 480.0;
-  s.pair->sigma_px = 0.5;
+  s.pair->sigma = 0.5;
   s.pair->readout_over_gap = 0.75;
   s.pair->lens = &GetLens(DistortionModel::kRadTan);
   s.pair->rate_group_sizes = {6, 7, 3};

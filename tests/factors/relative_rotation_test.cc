@@ -17,7 +17,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 struct Scene {
-  RelativeRotation::Measurement measurement;
+  PairMeasurement measurement;
   ShutterParameters shutter;
   Quaterniond q_gyro_cam;
   std::vector<Eigen::Matrix3Xd> groups;
@@ -34,7 +34,7 @@ struct Scene {
   }
   Vector3d Residual() {
     Vector3d r = Vector3d::Constant(std::nan(""));
-    EXPECT_TRUE(RelativeRotation(std::make_shared<RelativeRotation::Measurement>(measurement))
+    EXPECT_TRUE(RelativeRotation(std::make_shared<PairMeasurement>(measurement))
                     .Evaluate(Parameters().data(), r.data(), nullptr));
     return r;
   }
@@ -53,7 +53,7 @@ Scene MakeScene(uint64_t seed) {
   m.frame_a.stamp_s = 0.02;
   m.frame_b.stamp_s = 0.09;
   m.row_fraction = 0.5;
-  m.sigma_rad = 0.002;
+  m.sigma = 0.002;
   m.rate_group_sizes = {5, 8};
   Eigen::Matrix3Xd rates(3, 13);
   for (int i = 0; i < 13; ++i) {
@@ -73,7 +73,7 @@ TEST(RelativeRotation, ResidualIsTheErrorInSigmas) {
   Scene s = MakeScene(1);
   EXPECT_LT(s.Residual().norm(), 1e-9);
   // Turn the second camera by two sigma about the gyro's z axis.
-  const Vector3d turn_gyro_rad(0, 0, 2 * s.measurement.sigma_rad);
+  const Vector3d turn_gyro_rad(0, 0, 2 * s.measurement.sigma);
   s.measurement.q_a_b =
       s.measurement.q_a_b * Exp(Vector3d(s.q_gyro_cam.conjugate() * turn_gyro_rad));
   EXPECT_LT((s.Residual() - Vector3d(0, 0, 2)).norm(), 1e-9);
@@ -85,7 +85,7 @@ TEST(RelativeRotation, JacobianMatchesDifferences) {
     Scene s = MakeScene(seed);
     s.shutter[kDelay] += 0.0013;
     s.q_gyro_cam = s.q_gyro_cam * Exp(Vector3d(0.1, -0.2, 0.15));
-    const RelativeRotation factor(std::make_shared<RelativeRotation::Measurement>(s.measurement));
+    const RelativeRotation factor(std::make_shared<PairMeasurement>(s.measurement));
     ExpectJacobiansMatchDifferences(factor, s.Parameters(), 1e-7);
   }
 }
@@ -102,7 +102,7 @@ TEST(RelativeRotation, TakesTheFramesOwnTimes) {
     s.times_s << -0.002, 0.003;
     EXPECT_LT(s.Residual().norm(), 1e-9);
     s.times_s << 0.001, -0.004;
-    const RelativeRotation factor(std::make_shared<RelativeRotation::Measurement>(s.measurement));
+    const RelativeRotation factor(std::make_shared<PairMeasurement>(s.measurement));
     ExpectJacobiansMatchDifferences(factor, s.Parameters(), 1e-7);
   }
 }

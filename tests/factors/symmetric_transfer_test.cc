@@ -71,7 +71,7 @@ TEST(SymmetricTransfer, IsTheHomographyOfAGlobalShutter) {
   s.pair->lens = &GetLens(DistortionModel::kNone);
   s.shutter[kReadout] = 0.0;
   s.pair->noise = MatchNoise::kSecondImage;
-  const double sigma = s.pair->sigma_px;
+  const double sigma = s.pair->sigma;
   Eigen::Matrix3Xd rates(3, 16);
   rates << s.rate_groups[0], s.rate_groups[1], s.rate_groups[2];
   const RotationChain chain(s.pair->rate_times_s, rates);
@@ -95,12 +95,12 @@ TEST(SymmetricTransfer, IsTheHomographyOfAGlobalShutter) {
   }
 }
 
-// Noise of sigma_px in both images: the squares of a match's four residuals sum to 2 in the mean.
+// Noise of sigma in both images: the squares of a match's four residuals sum to 2 in the mean.
 TEST(SymmetricTransfer, IsWhitened) {
   PairScene s = RotationScene(1);
   const std::vector<Match> exact = s.pair->matches;
   std::mt19937_64 random(5);
-  std::normal_distribution<double> normal(0.0, s.pair->sigma_px);
+  std::normal_distribution<double> normal(0.0, s.pair->sigma);
   const int kDraws = 400;
   double sum = 0.0;
   for (int i = 0; i < kDraws; ++i) {
@@ -121,7 +121,7 @@ TEST(SymmetricTransfer, TwoResidualsOfAMatchAreIndependent) {
   PairScene s = RotationScene(1);
   const std::vector<Match> exact = s.pair->matches;
   std::mt19937_64 random(7);
-  std::normal_distribution<double> normal(0.0, s.pair->sigma_px);
+  std::normal_distribution<double> normal(0.0, s.pair->sigma);
   const int kDraws = 400;
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
   for (int i = 0; i < kDraws; ++i) {

@@ -105,6 +105,9 @@ TEST(AlignPatch, SaysNothingWithoutTextureOrOutsideOfThePicture) {
   EXPECT_TRUE(AlignPatch(picture, {100, 100}, picture, {100.2, 100}, kWindow));
   EXPECT_FALSE(AlignPatch(picture, {10, 100}, picture, {100, 100}, kWindow));
   EXPECT_FALSE(AlignPatch(picture, {100, 100}, picture, {100, 232}, kWindow));
+  // Widths that are even, or larger than a patch may be.
+  EXPECT_FALSE(AlignPatch(picture, {100, 100}, picture, {100.2, 100}, kMaxPatchPx - 1));
+  EXPECT_FALSE(AlignPatch(picture, {100, 100}, picture, {100.2, 100}, kMaxPatchPx + 2));
   // Not what was expected there.
   EXPECT_FALSE(AlignPatch(picture, {100, 100}, picture, {220, 160}, kWindow));
 }

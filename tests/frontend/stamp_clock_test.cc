@@ -92,6 +92,45 @@ TEST(StampClock, FindsTheClockBehindArrivals) {
   }
 }
 
+// The clock's offset is the stamps' median latency, whatever their tail.
+TEST(StampClock, MedianStampIsOnTime) {
+  for (const double longest_s : {1e-3, 10e-3, 30e-3}) {
+    SCOPED_TRACE(longest_s);
+    std::mt19937 random(11);
+    const std::vector<double> times = SamplingTimes({}, &random);
+    const StampClock clock = FindStampClock(Arrivals(times, 1e-3, longest_s, &random));
+    ASSERT_EQ(clock.sampled_ns.size(), times.size());
+    double level_s = 0.0;
+    for (size_t i = 0; i < times.size(); ++i) {
+      level_s += SecondsSince(1'000'000'000'000, clock.sampled_ns[i]) - times[i];
+    }
+    level_s /= static_cast<double>(times.size());
+    EXPECT_NEAR(level_s, std::log(2.0) * 1e-3, 0.1e-3);
+    EXPECT_LT(clock.report.level_sigma_s, 0.05e-3);
+    EXPECT_GT(clock.report.level_sigma_s, 2e-6);
+  }
+}
+
+// Attitudes that a program has written when it came around to it: every 13th interval or so is a
+// multiple of the period, up to 166 ms.
+TEST(StampClock, KnowsACleanClockOfWhichManySamplesAreMissing) {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::vector<int64_t> stamps{0};
+  int64_t number = 0;
+  for (int i = 0; i < 6500; ++i) {
+    number += uniform(random) < 0.08 ? 2 + static_cast<int64_t>(2.5 * uniform(random)) : 1;
+    if (i == 3000) number += 32;
+    const double quantised_s =
+        30.5e-6 * std::round(5.0269e-3 * static_cast<double>(number) / 30.5e-6);
+    stamps.push_back(StampAt(0, quantised_s));
+  }
+  const StampReport report = FindStampClock(stamps).report;
+  EXPECT_EQ(report.kind, StampKind::kMeasured);
+  EXPECT_NEAR(report.period_s, 5.0269e-3, 1e-7);
+  EXPECT_EQ(report.missing, static_cast<int>(number) - 6500);
+}
+
 // A driver empties the sensor's buffer of eight samples now and then: all get the time of the last.
 TEST(StampClock, LaysPacketsOnTheClock) {
   std::mt19937 random(3);

@@ -16,7 +16,7 @@ using testing::ElementsAreArray;
 using testing::HasSubstr;
 
 // f 290 px, t_r 20 ms, t_d 15 ms (defaults of the simulator).
-constexpr char kHandheld[] = R"(
+constexpr char kHandheldScenario[] = R"(
 duration_s: 4
 camera: {resolution: [320, 240], focal_px: 290, rate_hz: 20}
 tracks: {count: 50, noise_px: 0.2}
@@ -31,7 +31,7 @@ video: {format: mp4}
 
 using CommandsTest = CamgyroTest;
 
-// That of kHandheld, with sigmas that mean something.
+// That of kHandheldScenario, with sigmas that mean something.
 void ExpectTheTruth(const YAML::Node& calibration) {
   const auto expect_near = [](const YAML::Node& node, double truth, double most_sigma) {
     const double sigma = node["sigma"].as<double>();
@@ -44,7 +44,7 @@ void ExpectTheTruth(const YAML::Node& calibration) {
 }
 
 TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
-  Simulate(kHandheld, "a");
+  Simulate(kHandheldScenario, "a");
   const RunResult run = Run("calibrate a --out=result");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("focal length"), HasSubstr("readout time"), HasSubstr("±"),
@@ -90,7 +90,7 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
 }
 
 TEST_F(CommandsTest, CalibrateByTransfersWhereTheSceneIsFar) {
-  Simulate(std::string(kHandheld) + "scene: {depth_m: [2000, 20000]}\n", "a");
+  Simulate(std::string(kHandheldScenario) + "scene: {depth_m: [2000, 20000]}\n", "a");
   const RunResult run = Run("calibrate a --residual=transfer --out=result");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
@@ -101,7 +101,7 @@ TEST_F(CommandsTest, CalibrateByTransfersWhereTheSceneIsFar) {
 }
 
 TEST_F(CommandsTest, DelayFindsTheMiddleRowsDelay) {
-  Simulate(kHandheld, "a");
+  Simulate(kHandheldScenario, "a");
   const RunResult run = Run("delay a --out=result");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   double delay_ms = 0.0, sigma_ms = 0.0;
@@ -141,14 +141,14 @@ TEST_F(CommandsTest, TrackTakesACalibration) {
 }
 
 TEST_F(CommandsTest, TrackNeedsPictures) {
-  Simulate(kHandheld, "a");
+  Simulate(kHandheldScenario, "a");
   const RunResult run = Run("track a");
   EXPECT_EQ(run.exit_code, 3);
   EXPECT_THAT(run.err, HasSubstr("neither images nor a video"));
 }
 
 TEST_F(CommandsTest, SimulateMakesARecording) {
-  std::ofstream(Path("a.yaml")) << kHandheld;
+  std::ofstream(Path("a.yaml")) << kHandheldScenario;
   const RunResult run = Run("simulate a.yaml duration_s=1 --out=a");
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_TRUE(Exists("a/cam0/tracks.csv"));
@@ -157,7 +157,8 @@ TEST_F(CommandsTest, SimulateMakesARecording) {
 
 // With an effect that is given, not searched.
 TEST_F(CommandsTest, CalibrateFitsEffects) {
-  Simulate(std::string(kHandheld) + "effects: {radial_distortion: {k1: -0.15, k2: 0.03}}\n", "a");
+  Simulate(std::string(kHandheldScenario) + "effects: {radial_distortion: {k1: -0.15, k2: 0.03}}\n",
+           "a");
   const RunResult run = Run("calibrate a --out=result --effects=radial_distortion,clock_skew");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("radial_distortion"), HasSubstr("skew"), HasSubstr("ppm")));
@@ -179,7 +180,7 @@ TEST_F(CommandsTest, CalibrateFitsEffects) {
 }
 
 TEST_F(CommandsTest, DiagnoseSaysIfThereIsTooLittleAndStillCalibrates) {
-  std::string shorter = kHandheld;
+  std::string shorter = kHandheldScenario;
   shorter.replace(shorter.find("duration_s: 4"), 13, "duration_s: 3");
   Simulate(shorter, "a");
   const RunResult run = Run("diagnose a --out=result");
@@ -190,7 +191,7 @@ TEST_F(CommandsTest, DiagnoseSaysIfThereIsTooLittleAndStillCalibrates) {
 }
 
 TEST_F(CommandsTest, DiagnoseWritesItsAccount) {
-  std::string longer = kHandheld;
+  std::string longer = kHandheldScenario;
   longer.replace(longer.find("duration_s: 4"), 13, "duration_s: 9");
   Simulate(longer + "effects: {radial_distortion: {k1: -0.2, k2: 0.05}}\n", "a");
   const RunResult run = Run("diagnose a --out=result");

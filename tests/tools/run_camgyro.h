@@ -12,10 +12,10 @@
 #include <sstream>
 #include <string>
 
+#include "simulation/scenario.h"
+#include "simulation/simulate.h"
+#include "simulation/write_recording.h"
 #include "tests/paths.h"
-#include "tools/simulation/scenario.h"
-#include "tools/simulation/simulate.h"
-#include "tools/simulation/write_recording.h"
 
 namespace camgyro {
 

@@ -12,7 +12,7 @@
 #include "frontend/readers/read_recording.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/run.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro::comparison {
 namespace {

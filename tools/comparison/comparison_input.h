@@ -11,7 +11,7 @@
 #include "core/calibration.h"
 #include "core/recording.h"
 #include "core/result.h"
-#include "tools/simulation/scenario.h"
+#include "simulation/scenario.h"
 
 namespace camgyro::comparison {
 

@@ -251,12 +251,11 @@ std::string ErrorPlotSvg(const std::string& title, const SeedRun& run) {
   }
   // Lens and clock in the first row and a bit, then bias, then mounting, then the legend.
   for (int i = 0; i < kStateSize; ++i) {
-    const double x = kPanelWidth * (i % kColumns);
-    const double y = kTitleHeight + kPanelHeight * (i / kColumns);
-    svg += DrawPanel(x, y, i, last_frame, run);
+    const int row = i / kColumns, column = i % kColumns;
+    svg += DrawPanel(kPanelWidth * column, kTitleHeight + kPanelHeight * row, i, last_frame, run);
   }
-  svg += Legend(kPanelWidth * (kStateSize % kColumns),
-                kTitleHeight + kPanelHeight * (kStateSize / kColumns) + kTop + 8, run);
+  const int row = kStateSize / kColumns, column = kStateSize % kColumns;
+  svg += Legend(kPanelWidth * column, kTitleHeight + kPanelHeight * row + kTop + 8, run);
   return svg + "</svg>\n";
 }
 

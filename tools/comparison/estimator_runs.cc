@@ -110,7 +110,7 @@ void RunRefinement(const Input& input, const EstimationInput& data, const PairGr
   Calibration from = input.start;
   if (!window_trace.empty()) {
     from = window_trace.back().estimate;
-    options.graph.sigma_px = window_trace.back().noise_px;
+    options.graph.sigma = window_trace.back().noise_px;
   }
   std::optional<Result<Refined>> refined;
   Measure([&] { refined = Refine(data, data.pairs, from, input.prior, options); }, run);

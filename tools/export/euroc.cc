@@ -24,7 +24,7 @@ readout_time: @readout@  # [s] first to last row; negative: bottom to top
 timeshift_cam_imu: @delay@  # [s] of row 0
 )";
 
-constexpr char kImu[] = R"(# Made by `camgyro export` from @source@.
+constexpr char kEurocImu[] = R"(# Made by `camgyro export` from @source@.
 sensor_type: imu
 comment: noise is not estimated by camgyro
 T_BS:
@@ -56,7 +56,7 @@ std::vector<ExportedFile> ExportEuroc(const ExportInput& input) {
   }
   values["distortion_list"] = distorted ? values["distortion"] : "[]";
   return {{"cam0/sensor.yaml", FillIn(kCamera, values)},
-          {"imu0/sensor.yaml", FillIn(kImu, values)}};
+          {"imu0/sensor.yaml", FillIn(kEurocImu, values)}};
 }
 
 }  // namespace camgyro

@@ -26,7 +26,7 @@ cam0:
   rostopic: /cam0/image_raw
 )";
 
-constexpr char kImu[] =
+constexpr char kKalibrImu[] =
     R"(# Made by `camgyro export` from @source@.
 # Noise of the IMU, which camgyro does not estimate.
 gyroscope_noise_density: @gyro_noise@  # [rad/s/sqrt(Hz)] @gyro_noise_origin@
@@ -42,7 +42,8 @@ rostopic: /imu0
 std::vector<ExportedFile> ExportKalibr(const ExportInput& input) {
   auto values = CommonValues(input);
   values["T_cam_imu"] = Rows(Pose(input.calibration.q_gyro_cam.conjugate()), "  - ");
-  return {{"camchain-imucam.yaml", FillIn(kCamchain, values)}, {"imu.yaml", FillIn(kImu, values)}};
+  return {{"camchain-imucam.yaml", FillIn(kCamchain, values)},
+          {"imu.yaml", FillIn(kKalibrImu, values)}};
 }
 
 }  // namespace camgyro

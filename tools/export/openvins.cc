@@ -26,7 +26,7 @@ cam0:
   timeshift_cam_imu: @middle_delay@  # [s] middle row
 )";
 
-constexpr char kImu[] = R"(%YAML:1.0
+constexpr char kOpenVinsImu[] = R"(%YAML:1.0
 # Made by `camgyro export` from @source@.
 # Noise of the IMU, which camgyro does not estimate.
 imu0:
@@ -144,7 +144,7 @@ std::vector<ExportedFile> ExportOpenVins(const ExportInput& input) {
   values["bias"] = List({bias.x(), bias.y(), bias.z()});
   return {{"estimator_config.yaml", FillIn(kEstimator, values)},
           {"kalibr_imucam_chain.yaml", FillIn(kImuCam, values)},
-          {"kalibr_imu_chain.yaml", FillIn(kImu, values)}};
+          {"kalibr_imu_chain.yaml", FillIn(kOpenVinsImu, values)}};
 }
 
 }  // namespace camgyro

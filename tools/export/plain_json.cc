@@ -30,7 +30,10 @@ std::vector<ExportedFile> ExportJson(const ExportInput& input) {
       {"rotation", "w_gyro = R(q_gyro_cam) w_camera; camera frame x right, y down, z forward"},
       {"bias", "w_measured = w_true + bias_rad_s + noise"},
       {"focal", "focal_px = [fx, fy]; aspect ratio fx / fy; pixel (0, 0) is a centre"},
-      {"sigma", "one standard deviation; of the rotation about the camera's axes [rad]"}};
+      {"sigma",
+       "one standard deviation, of noise; sigma_total: with what effects that nobody has declared "
+       "may "
+       "add; of the rotation about the camera's axes [rad]"}};
   json["resolution"] = {c.width_px, c.height_px};
   json["focal_px"] = {lens[kFocal] * lens[kAspect], lens[kFocal]};
   json["principal_px"] = {lens[kCx], lens[kCy]};
@@ -48,6 +51,11 @@ std::vector<ExportedFile> ExportJson(const ExportInput& input) {
   json["sigma"] = Json::object();
   for (size_t i = 0; i < kStateSize; ++i) {
     json["sigma"][StateNames()[i]] = sigma[static_cast<Eigen::Index>(i)];
+  }
+  if (const auto total = c.sigma_total()) {
+    for (size_t i = 0; i < kStateSize; ++i) {
+      json["sigma_total"][StateNames()[i]] = (*total)[static_cast<Eigen::Index>(i)];
+    }
   }
   json["undetermined"] = undetermined;
   json["covariance"] = {{"order", StateNames()}, {"matrix", covariance}};

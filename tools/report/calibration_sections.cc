@@ -148,18 +148,20 @@ ReportSection SummarySection(const CalibrationReport& report, bool attitudes) {
       report.doubts.empty() &&
       std::all_of(rows.begin(), rows.end(), [](const auto& r) { return r.determined; });
   ReportTable table;
-  table.header = {"parameter", "value", "± sigma", "unit", ""};
+  table.header = {"parameter", "value", "± noise", "± in all", "unit", ""};
   for (const ParameterRow& row : rows) {
     const int decimals = DecimalsFor(row.sigma);
     const YamlPlace& place = kYamlPlaces[static_cast<size_t>(row.index)];
     const bool mounting = row.index >= kStateRotation;  // its value in the file is a quaternion
-    table.rows.push_back({{row.name, "", 0.0},
-                          {Format("%.*f", decimals, row.value),
-                           mounting ? "" : YamlKey(place, "value"), row.value / row.unit_scale},
-                          {Format("%.*f", decimals, row.sigma), YamlKey(place, place.sigma),
-                           row.sigma / row.unit_scale},
-                          {row.unit, "", 0.0},
-                          {row.determined ? "" : "not determined by this recording", "", 0.0}});
+    table.rows.push_back(
+        {{row.name, "", 0.0},
+         {Format("%.*f", decimals, row.value), mounting ? "" : YamlKey(place, "value"),
+          row.value / row.unit_scale},
+         {Format("%.*f", decimals, row.sigma), YamlKey(place, place.sigma),
+          row.sigma / row.unit_scale},
+         {row.sigma_total ? Format("%.*f", decimals, *row.sigma_total) : "", "", 0.0},
+         {row.unit, "", 0.0},
+         {row.determined ? "" : "not determined by this recording", "", 0.0}});
   }
   std::string html = Paragraph(Verdict(report, rows), sound ? "verdict" : "verdict warn");
   html += TableHtml(table);
@@ -167,7 +169,9 @@ ReportSection SummarySection(const CalibrationReport& report, bool attitudes) {
       "t_gyro = t_camera + delay + readout · row / height. The mounting is what is left, about the "
       "camera's axes (x right, y down, z forward), after " +
           DescribePermutation(permutation) +
-          ". Sigma: one standard deviation, of noise; what the model lacks is not in it.",
+          ". Both are one standard deviation: of noise alone, and with what effects may add that "
+          "nobody "
+          "has declared, at the sizes that devices usually show.",
       "note");
   html += EffectsTable(c);
   if (!report.doubts.empty()) html += "<h3>Doubts</h3>\n" + BulletList(report.doubts);

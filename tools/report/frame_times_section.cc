@@ -51,7 +51,8 @@ LineChart Distribution(const CalibrationReport& report, double spread_s) {
   chart.y_label = "share of the frames [%]";
   ChartSeries found{"found", {}, {}, false, false}, assumed{"assumed", {}, {}, false, true};
   for (int i = 0; i < kBins; ++i) {
-    const double at = kBinSpreads * (i - kBins / 2);
+    const int from_middle = i - kBins / 2;
+    const double at = kBinSpreads * from_middle;
     chart.x.push_back(1e3 * spread_s * at);
     found.y.push_back(100.0 * counts[static_cast<size_t>(i)] / std::max(1, told));
     assumed.y.push_back(100.0 * kBinSpreads / std::sqrt(2.0 * M_PI) * std::exp(-0.5 * at * at));

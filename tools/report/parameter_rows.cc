@@ -14,14 +14,23 @@ std::vector<ParameterRow> ParameterRows(const Calibration& c, const Eigen::Matri
                                         bool attitudes) {
   const StateVector values = ValuesOf(c, Eigen::Quaterniond(permutation));
   const StateVector sigma = c.sigma();
+  const std::optional<StateVector> total = c.sigma_total();
   std::vector<ParameterRow> rows;
   for (int i = 0; i < kStateSize; ++i) {
     const StateParameter& p = StateTable()[static_cast<size_t>(i)];
     if (attitudes && p.needs_pixels) continue;
     // An attitude has no rows.
     const bool delay = attitudes && i == kStateDelay;
-    rows.push_back({delay ? "delay" : p.label, i, p.unit_scale * values[i], p.unit_scale * sigma[i],
-                    p.unit_scale, p.unit, c.determined[static_cast<size_t>(i)]});
+    ParameterRow row;
+    row.name = delay ? "delay" : p.label;
+    row.index = i;
+    row.value = p.unit_scale * values[i];
+    row.sigma = p.unit_scale * sigma[i];
+    if (total) row.sigma_total = p.unit_scale * (*total)[i];
+    row.unit_scale = p.unit_scale;
+    row.unit = p.unit;
+    row.determined = c.determined[static_cast<size_t>(i)];
+    rows.push_back(row);
   }
   return rows;
 }

@@ -3,6 +3,7 @@
 #define CAMGYRO_TOOLS_REPORT_PARAMETER_ROWS_H_
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,10 +13,11 @@ namespace camgyro {
 
 struct ParameterRow {
   std::string name;
-  int index = 0;            // StateIndex
-  double value = 0.0;       // in `unit`
-  double sigma = 0.0;       // in `unit`
-  double unit_scale = 1.0;  // value in `unit` / value in the SI unit or px of the state
+  int index = 0;                      // StateIndex
+  double value = 0.0;                 // in `unit`
+  double sigma = 0.0;                 // in `unit`, of noise
+  std::optional<double> sigma_total;  // in `unit`, with what undeclared effects may add
+  double unit_scale = 1.0;            // value in `unit` / value in the SI unit or px of the state
   std::string unit;
   bool determined = false;
 };

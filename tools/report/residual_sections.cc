@@ -15,7 +15,6 @@ namespace {
 constexpr size_t kMinCount = 12;  // matches in a cell or bin
 constexpr int kMapColumns = 16;
 constexpr int kBins = 30;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // What a cell of the picture has seen.
 struct Cell {
@@ -52,7 +51,7 @@ ImageMap MapOf(const TitledResiduals& fit, int width_px, int height_px) {
       map.value(row, column) = TypicalResidual(cell.residuals, kMinCount);
       const Eigen::Vector2d mean = cell.count >= static_cast<int>(kMinCount)
                                        ? Eigen::Vector2d(cell.sum / cell.count)
-                                       : Eigen::Vector2d(kNaN, kNaN);
+                                       : Eigen::Vector2d(std::nan(""), std::nan(""));
       map.arrow_x(row, column) = mean.x();
       map.arrow_y(row, column) = mean.y();
     }
@@ -98,7 +97,7 @@ std::string Profile(const std::string& id, const std::string& title, const std::
 }  // namespace
 
 double TypicalResidual(const std::vector<double>& residuals_px, size_t min_count) {
-  if (residuals_px.size() < std::max<size_t>(1, min_count)) return kNaN;
+  if (residuals_px.size() < std::max<size_t>(1, min_count)) return std::nan("");
   std::vector<double> magnitudes;
   for (const double r : residuals_px) magnitudes.push_back(std::abs(r));
   return kSigmaOfMedian * MedianInPlace(&magnitudes);

@@ -244,7 +244,8 @@ Result<StabilizeReport> Stabilize(const Recording& recording, const Calibration&
     const Result<VideoContainer> video = ReadVideoContainer(recording.video_file);
     if (!video) return tl::unexpected(video.error());
     writing.source_start_s =
-        1e-9 * static_cast<double>(video->stamps_ns[static_cast<size_t>(first)]);
+        1e-9 *
+        static_cast<double>(video->stamps_ns[recording.PictureOf(static_cast<size_t>(first))]);
   }
   Result<std::unique_ptr<VideoWriter>> writer = VideoWriter::Open(file, container, writing);
   if (!writer) return tl::unexpected(writer.error());

@@ -10,7 +10,7 @@
 
 #include "core/result.h"
 #include "estimator/vins/initialise.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 

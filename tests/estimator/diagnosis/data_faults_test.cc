@@ -5,7 +5,7 @@
 #include "core/saturation.h"
 #include "core/so3.h"
 #include "frontend/camera_rotations.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {
@@ -113,6 +113,18 @@ TEST(DataFaults, RepeatedPicturesAreLeftOut) {
   EXPECT_EQ(DropRepeatedPictures(&untouched), 0);
   EXPECT_EQ(untouched.frames.size(), sound.frames.size());
   EXPECT_TRUE(untouched.faults.empty());
+}
+
+// A stream that hangs for a quarter of a second, while the camera turns on.
+TEST(DataFaults, AFrozenPictureIsLeftOut) {
+  Recording recording = Simulate({"motion.kind=running"}).recording;
+  const size_t all = recording.frames.size();
+  for (size_t i = 60; i < 67; ++i) recording.tracks[i] = recording.tracks[59];
+  EXPECT_EQ(DropRepeatedPictures(&recording), 7);
+  ASSERT_EQ(recording.frames.size(), all - 7);
+  EXPECT_EQ(recording.PictureOf(59), 59u);
+  EXPECT_EQ(recording.PictureOf(60), 67u);
+  EXPECT_TRUE(FindDataFaults(recording).empty());  // the gap is one of our making
 }
 
 TEST(DataFaults, DuplicatedFrames) {

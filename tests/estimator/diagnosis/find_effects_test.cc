@@ -4,7 +4,7 @@
 #include "core/so3.h"
 #include "core/standard_distortion.h"
 #include "estimator/diagnosis/diagnose.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {

@@ -6,7 +6,7 @@
 #include <set>
 #include <tuple>
 
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/effects/catalogue.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {

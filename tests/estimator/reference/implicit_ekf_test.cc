@@ -9,7 +9,7 @@
 
 #include "core/so3.h"
 #include "estimator/reference/calibrate_with_ekf.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {

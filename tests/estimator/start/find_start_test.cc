@@ -54,7 +54,7 @@ TEST(FindStart, FindsEveryAxisPermutationWithDelaysOfSeconds) {
   }
 }
 
-SimulatedTruth UsualTruth() {
+SimulatedTruth NoisyTruth() {
   SimulatedTruth truth;
   truth.delay_s = 0.041;
   truth.q_gyro_cam = Exp(Eigen::Vector3d(0.03, -0.02, 1.6));
@@ -68,7 +68,7 @@ TEST(FindStart, SigmasAreHonest) {
   Eigen::Matrix<double, 7, 1> chi_square = Eigen::Matrix<double, 7, 1>::Zero();
   constexpr int kRuns = 40;
   for (int run = 0; run < kRuns; ++run) {
-    const SimulatedTruth truth = UsualTruth();
+    const SimulatedTruth truth = NoisyTruth();
     const Simulated s = Simulate(SmoothRandomRate(500 + run, 0.8), truth, run);
     const auto start = FindStart(s.recording, s.rotations, {});
     ASSERT_TRUE(start) << start.error().message;
@@ -88,7 +88,7 @@ TEST(FindStart, SigmasAreHonest) {
 }
 
 TEST(FindStart, OutliersAreWeighedDown) {
-  const SimulatedTruth truth = UsualTruth();
+  const SimulatedTruth truth = NoisyTruth();
   Simulated s = Simulate(SmoothRandomRate(2, 0.8), truth, 2);
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -105,7 +105,7 @@ TEST(FindStart, OutliersAreWeighedDown) {
 }
 
 TEST(FindStart, GuessesThatAreFarOffDoNotMatter) {
-  const SimulatedTruth truth = UsualTruth();
+  const SimulatedTruth truth = NoisyTruth();
   Simulated s = Simulate(SmoothRandomRate(4, 0.8), truth, 4);
   s.recording.camera.delay_s = truth.delay_s - 1.95;
   s.recording.camera.q_gyro_cam = Eigen::Quaterniond(AxisPermutations(1)[7]);
@@ -123,7 +123,7 @@ TEST(FindStart, GuessesThatAreFarOffDoNotMatter) {
 }
 
 TEST(FindStart, ClocksOfDifferentOriginAreAligned) {
-  SimulatedTruth truth = UsualTruth();
+  SimulatedTruth truth = NoisyTruth();
   truth.delay_s = -1.6e9 + 0.041;  // camera in Unix time, gyro since boot
   truth.first_frame_ns = 1'600'000'100'000'000'000;
   const Simulated s = Simulate(SmoothRandomRate(5, 0.8), truth, 5);
@@ -143,7 +143,7 @@ RateFunction PanRate(const Eigen::Quaterniond& q_gyro_cam) {
 }
 
 TEST(FindStart, PanningLeavesOneAngleOpen) {
-  const SimulatedTruth truth = UsualTruth();
+  const SimulatedTruth truth = NoisyTruth();
   Simulated s = Simulate(PanRate(truth.q_gyro_cam), truth, 6);
   auto start = FindStart(s.recording, s.rotations, {});
   ASSERT_TRUE(start) << start.error().message;
@@ -167,7 +167,7 @@ TEST(FindStart, PanningLeavesOneAngleOpen) {
 
 TEST(FindStart, LittleTiltPicksThePermutation) {
   // 2 % of the motion about other axes: tells the four permutations apart, not the angle.
-  SimulatedTruth truth = UsualTruth();
+  SimulatedTruth truth = NoisyTruth();
   truth.q_gyro_cam = Eigen::Quaterniond(AxisPermutations(1)[5]);
   const RateFunction pan = PanRate(truth.q_gyro_cam), other = SmoothRandomRate(8, 0.03);
   const Simulated s =
@@ -198,7 +198,7 @@ TEST(FindStartRefuses, NoiseAtRest) {
   for (int seed = 0; seed < 10; ++seed) {
     SCOPED_TRACE(seed);
     ExpectRefused(
-        Simulate([](double) { return Eigen::Vector3d::Zero().eval(); }, UsualTruth(), seed),
+        Simulate([](double) { return Eigen::Vector3d::Zero().eval(); }, NoisyTruth(), seed),
         "no rotation in the recording");
   }
 }
@@ -206,15 +206,15 @@ TEST(FindStartRefuses, NoiseAtRest) {
 TEST(FindStartRefuses, APictureThatDoesNotFollowTheGyro) {
   for (int seed = 0; seed < 10; ++seed) {
     SCOPED_TRACE(seed);
-    Simulated s = Simulate(SmoothRandomRate(20 + seed, 0.8), UsualTruth(), seed);
-    s.rotations = Simulate(SmoothRandomRate(50 + seed, 0.3), UsualTruth(), seed).rotations;
+    Simulated s = Simulate(SmoothRandomRate(20 + seed, 0.8), NoisyTruth(), seed);
+    s.rotations = Simulate(SmoothRandomRate(50 + seed, 0.3), NoisyTruth(), seed).rotations;
     ExpectRefused(s, "does not follow the gyro");
   }
 }
 
 TEST(FindStartRefuses, APictureThatFollowsPartly) {
   // Electronic stabilisation that leaves a third of each rotation: correlation 1, but not a camera.
-  Simulated s = Simulate(SmoothRandomRate(9, 0.8), UsualTruth(), 9);
+  Simulated s = Simulate(SmoothRandomRate(9, 0.8), NoisyTruth(), 9);
   for (CameraRotation& rotation : s.rotations) {
     rotation.q_a_b = Exp(Eigen::Vector3d(Log(rotation.q_a_b) / 3.0));
   }
@@ -225,14 +225,14 @@ TEST(FindStartRefuses, PeriodicMotion) {
   const RateFunction swing = [](double t) -> Eigen::Vector3d {
     return std::sin(2.0 * M_PI * 1.5 * t) * Eigen::Vector3d(0.7, 0.2, -0.1);
   };
-  ExpectRefused(Simulate(swing, UsualTruth(), 1), "ambiguous delay");
+  ExpectRefused(Simulate(swing, NoisyTruth(), 1), "ambiguous delay");
   SimulatedTruth exact;
   exact.delay_s = 0.0313;
   ExpectRefused(Simulate(swing, exact, 1), "ambiguous delay");
 }
 
 TEST(FindStartRefuses, ShortRecordings) {
-  SimulatedTruth truth = UsualTruth();
+  SimulatedTruth truth = NoisyTruth();
   truth.duration_s = 0.4;
   ExpectRefused(Simulate(SmoothRandomRate(1, 0.8), truth, 1), "too short: 12 camera rotations");
   truth.duration_s = 10.0;
@@ -244,26 +244,26 @@ TEST(FindStartRefuses, ShortRecordings) {
 }
 
 TEST(FindStartRefuses, ClocksThatDoNotOverlapAndDoNotFit) {
-  Simulated s = Simulate(SmoothRandomRate(20, 0.8), UsualTruth(), 1);
-  s.rotations = Simulate(SmoothRandomRate(21, 0.8), UsualTruth(), 1).rotations;
+  Simulated s = Simulate(SmoothRandomRate(20, 0.8), NoisyTruth(), 1);
+  s.rotations = Simulate(SmoothRandomRate(21, 0.8), NoisyTruth(), 1).rotations;
   for (Frame& frame : s.recording.frames) frame.stamp_ns += 3'600'000'000'000;
   ExpectRefused(s, "no overlap in time between camera and gyro");
 }
 
 TEST(FindStartRefuses, DegreesPerSecond) {
-  Simulated s = Simulate(SmoothRandomRate(3, 0.8), UsualTruth(), 3);
+  Simulated s = Simulate(SmoothRandomRate(3, 0.8), NoisyTruth(), 3);
   for (GyroSample& sample : s.recording.gyro) sample.omega_gyro_rad_s *= 180.0 / M_PI;
   ExpectRefused(s, "gyro in deg/s?");
 }
 
 TEST(FindStartRefuses, AnAxisWithTheWrongSign) {
-  Simulated s = Simulate(SmoothRandomRate(3, 0.8), UsualTruth(), 3);
+  Simulated s = Simulate(SmoothRandomRate(3, 0.8), NoisyTruth(), 3);
   for (GyroSample& sample : s.recording.gyro) sample.omega_gyro_rad_s.y() *= -1.0;
   ExpectRefused(s, "a gyro axis has the wrong sign");
 }
 
 TEST(FindStartRefuses, MalformedRotations) {
-  Simulated s = Simulate(SmoothRandomRate(3, 0.8), UsualTruth(), 3);
+  Simulated s = Simulate(SmoothRandomRate(3, 0.8), NoisyTruth(), 3);
   const CameraRotation good = s.rotations[4];
   s.rotations[4].frame_b = 301;
   auto start = FindStart(s.recording, s.rotations, {});
@@ -283,7 +283,7 @@ TEST(FindStartRefuses, MalformedRotations) {
 }
 
 TEST(FindStart, IsRepeatable) {
-  const Simulated s = Simulate(SmoothRandomRate(11, 0.8), UsualTruth(), 11);
+  const Simulated s = Simulate(SmoothRandomRate(11, 0.8), NoisyTruth(), 11);
   const auto a = FindStart(s.recording, s.rotations, {});
   const auto b = FindStart(s.recording, s.rotations, {});
   ASSERT_TRUE(a && b);
@@ -310,7 +310,7 @@ TEST(FindStart, FindsAClockThatRunsFastOrSlow) {
                                              {0.003, 120.0}};
   for (const auto& [skew, duration_s] : cases) {
     SCOPED_TRACE(std::to_string(skew) + " over " + std::to_string(duration_s) + " s");
-    SimulatedTruth truth = UsualTruth();
+    SimulatedTruth truth = NoisyTruth();
     truth.duration_s = duration_s;
     truth.gyro_hz = 100.0;
     Simulated s = Simulate(SmoothRandomRate(11, 0.8), truth, 2);
@@ -334,7 +334,7 @@ TEST(FindStart, FindsAClockThatRunsFastOrSlow) {
 TEST(FindStart, TakesNoOtherDelayForAClock) {
   for (const char* what : {"clean", "step", "wander", "jitter"}) {
     SCOPED_TRACE(what);
-    SimulatedTruth truth = UsualTruth();
+    SimulatedTruth truth = NoisyTruth();
     truth.duration_s = 40.0;
     truth.gyro_hz = 100.0;
     Simulated s = Simulate(SmoothRandomRate(12, 0.8), truth, 3);

@@ -25,7 +25,7 @@ CameraRotationsAtFocal SeenAt(const Simulated& s) {
   };
 }
 
-SimulatedTruth UsualTruth() {
+SimulatedTruth CoarseTruth() {
   SimulatedTruth truth;
   truth.delay_s = -0.37;
   truth.q_gyro_cam = Exp(Eigen::Vector3d(0.03, -0.02, 1.6));
@@ -35,7 +35,7 @@ SimulatedTruth UsualTruth() {
 }
 
 Simulated MakeScene(const RateFunction& rate, int seed) {
-  Simulated s = Simulate(rate, UsualTruth(), seed);
+  Simulated s = Simulate(rate, CoarseTruth(), seed);
   s.recording.camera.width_px = 640;
   s.recording.camera.height_px = 480;
   return s;
@@ -54,7 +54,7 @@ TEST(FindStartAndFocal, FindsTheFocalLength) {
     EXPECT_NEAR(start->focal->value_px, kTrueFocalPx, 0.02 * kTrueFocalPx);
     EXPECT_LT(start->focal->sigma_px, 0.025 * kTrueFocalPx);
     EXPECT_LT(start->focal->runner_up_ratio, 0.7);
-    EXPECT_NEAR(start->delay_middle_row_s, UsualTruth().delay_s, 0.003);
+    EXPECT_NEAR(start->delay_middle_row_s, CoarseTruth().delay_s, 0.003);
     EXPECT_EQ(start->focal->curve.size(), 24u);
     chi_square +=
         std::pow((start->focal->value_px - kTrueFocalPx) / start->focal->sigma_px, 2) / kRuns;
@@ -73,7 +73,7 @@ TEST(FindStartAndFocal, AGuessThatIsFarOffDoesNotMatter) {
 
 TEST(FindStartAndFocal, RollDoesNotTell) {
   const RateFunction smooth = SmoothRandomRate(80, 1.2);
-  const Eigen::Quaterniond q_gyro_cam = UsualTruth().q_gyro_cam;
+  const Eigen::Quaterniond q_gyro_cam = CoarseTruth().q_gyro_cam;
   Simulated s = MakeScene(
       [&](double t) -> Eigen::Vector3d {
         return q_gyro_cam * Eigen::Vector3d(0, 0, smooth(t).x());

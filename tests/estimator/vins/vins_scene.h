@@ -9,7 +9,7 @@
 
 #include "core/time.h"
 #include "estimator/vins/initialise.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 

@@ -9,7 +9,7 @@
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
 #include "factors/coplanarity_plane.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro {
 namespace {
@@ -172,7 +172,11 @@ TEST(EffectOfALens, LeavesOutPixelsWithoutARayIfAsked) {
     options.drop_without_ray = drop;
     PairGraph graph(start, prior, options);
     for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {0.3, 0.1, 0.0}});
-    ASSERT_EQ(graph.AddPair(0, {0.2}, {0.2 + 1.0 / 30.0}, matches), AddPairResult::kAdded);
+    TimedPair pair;
+    pair.time_a_s = 0.2;
+    pair.time_b_s = 0.2 + 1.0 / 30.0;
+    pair.matches = matches;
+    ASSERT_EQ(graph.AddPair(pair), AddPairResult::kAdded);
     EXPECT_EQ(graph.Residuals(0, false).size(), drop ? 11U : 0U);
   }
 }

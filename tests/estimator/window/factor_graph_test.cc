@@ -72,9 +72,9 @@ std::vector<FactorGraph::Functional> AllCoordinates(const FactorGraph& graph,
 }
 
 MatrixXd CovarianceOf(const FactorGraph& graph, const std::vector<BlockId>& blocks) {
-  const FactorGraph::CovarianceReport report = graph.Covariance(AllCoordinates(graph, blocks));
-  EXPECT_TRUE(report.usable);
-  return report.covariance;
+  const auto report = graph.Covariance(AllCoordinates(graph, blocks));
+  EXPECT_TRUE(report.has_value()) << report.error().message;
+  return report->covariance;
 }
 
 // Step i of a linear problem shaped like the estimator's: rates and a bias per step, one block that
@@ -98,7 +98,7 @@ void AddLinearStep(int i, FactorGraph* graph) {
 // Levenberg-Marquardt ends where the cost, to its rounding, does not fall any more, some 1e-9 away.
 void SolveLinear(FactorGraph* graph) {
   ASSERT_TRUE(graph->Solve(kToTheEnd).usable);
-  const Linearization linear = graph->Linearize(AllKeys(*graph));
+  const Linearization linear = graph->Linearize(AllKeys(*graph)).value();
   const VectorXd step = -linear.J.colPivHouseholderQr().solve(linear.residuals);
   EXPECT_LT(step.norm(), 1e-7);
   for (size_t k = 0; k < linear.blocks.size(); ++k) {
@@ -119,7 +119,7 @@ TEST(FactorGraph, WindowOfALinearProblemEqualsTheBatch) {
     AddLinearStep(i, &window);
     ASSERT_TRUE(window.Solve({2, 1e-6}).usable);  // roughly: where it is linearised must not matter
     if (i >= kWindow) {
-      EXPECT_EQ(window.Marginalize({Rates(i - kWindow), Bias(i - kWindow)}), 0);
+      EXPECT_EQ(window.Marginalize({Rates(i - kWindow), Bias(i - kWindow)}).value(), 0);
     }
   }
   EXPECT_EQ(window.blocks().size(), 1u + 2u * kWindow);
@@ -141,14 +141,14 @@ TEST(FactorGraph, CovarianceOfFunctionalsIsTheInverseOfTheDenseInformation) {
   graph.AddBlock(Shutter(), Euclidean(Eigen::Vector2d(1.0, -2.0)));
   graph.AddFactor(RandomNumbers(1).Factor(2, {2}), {Shutter()});
   for (int i = 0; i < 6; ++i) AddLinearStep(i, &graph);
-  const Linearization linear = graph.Linearize(AllKeys(graph));
+  const Linearization linear = graph.Linearize(AllKeys(graph)).value();
   const MatrixXd dense = (linear.J.transpose() * linear.J).inverse();
   const MatrixXd got = CovarianceOf(graph, linear.blocks);
   ASSERT_EQ(got.rows(), dense.rows());
   EXPECT_LT((got - dense).norm(), 1e-9 * dense.norm());
 
   // A sum over blocks: weights 0.5 and -2 on two coordinates.
-  const auto report = graph.Covariance({{{Bias(2), 1, 0.5}, {Rates(4), 3, -2.0}}});
+  const auto report = graph.Covariance({{{Bias(2), 1, 0.5}, {Rates(4), 3, -2.0}}}).value();
   VectorXd weights = VectorXd::Zero(dense.rows());
   for (size_t k = 0; k < linear.blocks.size(); ++k) {
     if (linear.blocks[k] == Bias(2)) weights[linear.offsets[k] + 1] = 0.5;
@@ -170,7 +170,35 @@ TEST(FactorGraph, WithoutInformationThereIsNoCovariance) {
   row << 1.0, 0.0;
   graph.AddFactor(std::make_shared<LinearFactor>(std::vector<MatrixXd>{row}, VectorXd::Zero(1)),
                   {Shutter()});
-  EXPECT_FALSE(graph.Covariance({{{Shutter(), 0, 1.0}}}).usable);
+  const auto report = graph.Covariance({{{Shutter(), 0, 1.0}}});
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().kind, ErrorKind::kCannotEstimate);
+  EXPECT_EQ(report.error().message, "the information matrix is singular");
+}
+
+// As a match whose ray the lens has lost.
+class WithoutValue : public ceres::SizedCostFunction<1, 2> {
+ public:
+  bool Evaluate(const double* const*, double*, double**) const override { return false; }
+};
+
+TEST(FactorGraph, AFactorWithoutValueIsAnErrorThatChangesNothing) {
+  FactorGraph graph;
+  graph.AddBlock(Shutter(), Euclidean(Eigen::Vector2d(1.0, -2.0)));
+  graph.AddFactor(RandomNumbers(1).Factor(2, {2}), {Shutter()});
+  graph.AddFactor(std::make_shared<WithoutValue>(), {Shutter()});
+  const auto expect_error = [](const auto& result) {
+    ASSERT_FALSE(result.has_value());
+    EXPECT_EQ(result.error().kind, ErrorKind::kCannotEstimate);
+    EXPECT_THAT(result.error().message, ::testing::HasSubstr("no value at the estimate"));
+  };
+  expect_error(graph.Covariance({{{Shutter(), 0, 1.0}}}));
+  expect_error(graph.Linearize(AllKeys(graph)));
+  expect_error(graph.Marginalize({Shutter()}));
+  EXPECT_TRUE(graph.Has(Shutter()));
+  EXPECT_EQ(graph.factors().size(), 2u);
+  EXPECT_FALSE(graph.Solve({}).usable);
+  EXPECT_EQ(VectorXd(graph.value(Shutter())), VectorXd(Eigen::Vector2d(1.0, -2.0)));
 }
 
 // Camera rotations against a turning gyro: rate groups of 4 samples, rotations over two groups.
@@ -204,7 +232,7 @@ FactorGraph RotationProblem(int groups) {
     graph.AddFactor(std::make_shared<GyroRate>(noisy, Vector3d::Constant(0.01)),
                     {Rates(g), Bias(0)});
     if (g == 0) continue;
-    auto m = std::make_shared<RelativeRotation::Measurement>();
+    auto m = std::make_shared<PairMeasurement>();
     m->frame_a.stamp_s = times[static_cast<size_t>(4 * g - 4)] + 0.012;
     m->frame_b.stamp_s = times[static_cast<size_t>(4 * g)] + 0.022;
     m->q_a_b =
@@ -212,7 +240,7 @@ FactorGraph RotationProblem(int groups) {
                            chain.At(m->frame_a.stamp_s).R_ref_gyro.transpose() *
                            chain.At(m->frame_b.stamp_s).R_ref_gyro * q_gyro_cam.toRotationMatrix());
     m->q_a_b = m->q_a_b * Exp(Vector3d(0.002 * random.Vector(3)));
-    m->sigma_rad = 0.002;
+    m->sigma = 0.002;
     for (int i = 4 * g - 4; i < 4 * g + 4; ++i) m->rate_times_s.push_back(times[size_t(i)]);
     m->rate_group_sizes = {4, 4};
     graph.AddFactor(std::make_shared<RelativeRotation>(m),
@@ -225,7 +253,7 @@ TEST(FactorGraph, NothingMovesAfterMarginalisingAtTheOptimum) {
   FactorGraph graph = RotationProblem(12);
   ASSERT_TRUE(graph.Solve(kToTheEnd).usable);
   const FactorGraph at_optimum = graph;
-  for (int g = 0; g < 8; ++g) EXPECT_EQ(graph.Marginalize({Rates(g)}), 0);
+  for (int g = 0; g < 8; ++g) EXPECT_EQ(graph.Marginalize({Rates(g)}).value(), 0);
   std::vector<BlockId> stay;
   for (const auto& entry : graph.blocks()) stay.push_back(entry.first);
   EXPECT_EQ(stay.size(), 7u);
@@ -253,7 +281,7 @@ TEST(FactorGraph, BlockWithConstantCoordinatesSurvives) {
   for (int i = 0; i < 2; ++i) graph.AddFactor(random.Factor(9, {8, 3}), {lens, Rates(i)});
   FactorGraph batch = graph;
   ASSERT_TRUE(batch.Solve(kToTheEnd).usable);
-  EXPECT_EQ(graph.Marginalize({Rates(0)}), 0);
+  EXPECT_EQ(graph.Marginalize({Rates(0)}).value(), 0);
   ASSERT_TRUE(graph.Has(lens));
   EXPECT_EQ(graph.block(lens).constant, (std::vector<int>{3, 5, 6, 7}));
   ASSERT_TRUE(graph.Solve(kToTheEnd).usable);
@@ -269,7 +297,7 @@ TEST(FactorGraph, BlockWithConstantCoordinatesSurvives) {
   fixed.AddFactor(random.Factor(7, {2, 3, 3}), {Shutter(), Rates(0), Rates(1)});
   FactorGraph whole = fixed;
   ASSERT_TRUE(whole.Solve(kToTheEnd).usable);
-  EXPECT_EQ(fixed.Marginalize({Rates(0)}), 0);
+  EXPECT_EQ(fixed.Marginalize({Rates(0)}).value(), 0);
   ASSERT_TRUE(fixed.Solve(kToTheEnd).usable);
   EXPECT_EQ(fixed.value(Shutter()), VectorXd(Eigen::Vector2d(0.3, 0.4)));
   EXPECT_LT((fixed.value(Rates(1)) - whole.value(Rates(1))).norm(), 1e-9);
@@ -283,9 +311,9 @@ TEST(FactorGraph, OrphansAndSingleBlocksLeaveNothingBehind) {
   graph.AddBlock(Bias(2), Euclidean(random.Vector(3)));
   graph.AddFactor(random.Factor(5, {3}), {Bias(1)});
   graph.AddFactor(random.Factor(5, {3}), {Bias(2)});
-  EXPECT_EQ(graph.Marginalize({Bias(0)}), 0);  // no factor touches it
+  EXPECT_EQ(graph.Marginalize({Bias(0)}).value(), 0);  // no factor touches it
   EXPECT_EQ(graph.factors().size(), 2u);
-  EXPECT_EQ(graph.Marginalize({Bias(1)}), 0);  // a factor, but no neighbour
+  EXPECT_EQ(graph.Marginalize({Bias(1)}).value(), 0);  // a factor, but no neighbour
   EXPECT_EQ(graph.factors().size(), 1u);
   EXPECT_EQ(graph.blocks().size(), 1u);
   EXPECT_TRUE(graph.Has(Bias(2)));
@@ -306,7 +334,7 @@ TEST(FactorGraph, CountsWhatNoFactorDetermined) {
         return alone;
       }(),
       {Bias(1)});
-  EXPECT_EQ(graph.Marginalize({Bias(0)}), 2);
+  EXPECT_EQ(graph.Marginalize({Bias(0)}).value(), 2);
   // The one row says nothing about the neighbour, once Bias(0) is free.
   EXPECT_LT((CovarianceOf(graph, {Bias(1)}) - before).norm(), 1e-9 * before.norm());
 }

@@ -77,6 +77,39 @@ TEST(GyroCollector, EqualStampsOfPacketsStay) {
   EXPECT_TRUE(recording.faults.empty());
 }
 
+TEST(MendAccel, LeavesOutWhatDoesNotFit) {
+  Recording recording;
+  for (int i = 0; i < 100; ++i) recording.accel.push_back({i * kInterval, {0.0, 0.0, 1.0 * i}});
+  recording.accel[40].stamp_ns = recording.accel[39].stamp_ns;
+  recording.accel[70].stamp_ns -= 3 * kInterval;
+  MendAccel("accel.csv", &recording);
+  ASSERT_EQ(recording.accel.size(), 98u);
+  for (const AccelSample& sample : recording.accel) {
+    EXPECT_EQ(sample.stamp_ns, std::lround(sample.accel_gyro_m_s2.z()) * kInterval);
+  }
+  ASSERT_EQ(recording.faults.size(), 1u);
+  EXPECT_EQ(recording.faults[0].name, "accel_stamps");
+  EXPECT_EQ(recording.faults[0].count, 2);
+  EXPECT_THAT(recording.faults[0].finding, HasSubstr("accel.csv: 2 of 100"));
+}
+
+// No calibration needs the accelerometer: its stamps are no reason to refuse a recording.
+TEST(MendAccel, LeavesOutAnAccelerometerThatIsNotInOrder) {
+  Recording recording;
+  for (int i = 0; i < 100; ++i) recording.accel.push_back({i / 2 * kInterval, {0.0, 0.0, 9.8}});
+  MendAccel("accel.csv", &recording);
+  EXPECT_TRUE(recording.accel.empty());
+  ASSERT_EQ(recording.faults.size(), 1u);
+  EXPECT_EQ(recording.faults[0].count, 50);
+  EXPECT_THAT(recording.faults[0].finding, HasSubstr("the accelerometer is not used"));
+
+  recording = {};
+  for (int i = 0; i < 100; ++i) recording.accel.push_back({i * kInterval, {0.0, 0.0, 9.8}});
+  MendAccel("accel.csv", &recording);
+  EXPECT_EQ(recording.accel.size(), 100u);
+  EXPECT_TRUE(recording.faults.empty());
+}
+
 TEST(GyroCollector, RefusesTwoStreamsInOneFile) {
   // One behind the other.
   std::vector<GyroSample> samples = CleanSamples(200);

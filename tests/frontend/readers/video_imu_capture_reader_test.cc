@@ -109,7 +109,7 @@ TEST_F(VideoImuCapture, WhatIsNotWholeIsRefused) {
       {good_ + Imu(1010000000, {0, std::nanf(""), 0}), "not finite"},
       {good_ + Picture(1160000000, 4), "has a picture number 4, but the video has 4"},
       {good_ + Picture(1160000000, 3), "picture 3 is there twice"},
-      {good_ + Picture(1030000000, 2), "picture 2: timestamp 1030000000 goes back"},
+      {good_ + Picture(1030000000, 2), "frame 3: timestamp 1030000000 goes back"},
       {camera_ + Imu(1, {0, 0, 0}) + Imu(10000000, {0, 0, 0}), "has no pictures"},
   };
   for (const auto& [meta, complaint] : cases) {

@@ -14,7 +14,7 @@
 #include "core/so3.h"
 #include "core/time.h"
 #include "estimator/reference/implicit_ekf.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 
 namespace camgyro::comparison {
 namespace {

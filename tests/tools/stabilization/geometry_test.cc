@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/so3.h"
-#include "tools/simulation/simulate.h"
+#include "simulation/simulate.h"
 #include "tools/stabilization/camera_path.h"
 #include "tools/stabilization/frame_warp.h"
 #include "tools/stabilization/registration.h"

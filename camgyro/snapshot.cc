@@ -1,0 +1,60 @@
+#include "camgyro/snapshot.h"
+
+#include <cstddef>
+
+#include "camgyro/convert.h"
+
+namespace camgyro::api {
+namespace {
+
+// The sigmas that make a parameter ready, in the order of the state.
+StateVector WantedSigmas(const CalibratorOptions& options, const camgyro::Calibration& c) {
+  const double principal_px = options.ready_principal * c.width_px;
+  StateVector wanted;
+  wanted << options.ready_focal * c.lens[camgyro::kFocal], principal_px, principal_px,
+      options.ready_readout_s, options.ready_delay_s,
+      Eigen::Vector3d::Constant(options.ready_bias_rad_s),
+      Eigen::Vector3d::Constant(options.ready_rotation_rad);
+  return wanted;
+}
+
+void FillEstimate(const OnlineCalibration::Progress& progress, const CalibratorOptions& options,
+                  Snapshot* next) {
+  const camgyro::Calibration& c = *progress.estimate;
+  next->has_estimate = true;
+  next->calibration = ToApi(c);
+  const StateVector value = ValuesOf(c, c.q_gyro_cam);
+  const StateVector wanted = WantedSigmas(options, c);
+  const StateVector sigma = c.sigma();
+  next->ready = true;
+  for (int i = 0; i < kStateSize; ++i) {
+    ParameterState& p = next->parameters[static_cast<std::size_t>(i)];
+    p.value = value[i];
+    p.sigma = sigma[i];
+    p.wanted_sigma = wanted[i];
+    p.readiness = !(sigma[i] < 0.5 * progress.prior_sigma[i])  ? Readiness::kUndetermined
+                  : !(sigma[i] <= wanted[i])                   ? Readiness::kImprecise
+                  : !(progress.movement[i] <= 2.0 * wanted[i]) ? Readiness::kUnsteady
+                                                               : Readiness::kReady;
+    next->ready = next->ready && p.readiness == Readiness::kReady;
+  }
+}
+
+}  // namespace
+
+Snapshot MakeSnapshot(const OnlineCalibration::Progress& progress,
+                      const CalibratorOptions& options) {
+  Snapshot next;
+  next.stage = progress.estimating ? Stage::kEstimating : Stage::kCollecting;
+  next.message = progress.message;
+  next.frame_stamp_ns = progress.frame_stamp_ns;
+  next.noise_px = progress.noise_px;
+  next.frames = progress.frames;
+  next.pairs_used = progress.pairs_used;
+  next.pairs_skipped = progress.pairs_skipped;
+  next.starts = progress.starts;
+  if (progress.estimate) FillEstimate(progress, options, &next);
+  return next;
+}
+
+}  // namespace camgyro::api

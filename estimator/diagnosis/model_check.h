@@ -1,0 +1,33 @@
+// What a calibration does not know of its model: the systematic part of its error, and whether the
+// residuals show an effect that the model lacks. Without refitting anything.
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_MODEL_CHECK_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_MODEL_CHECK_H_
+
+#include <optional>
+#include <string>
+
+#include "core/recording.h"
+#include "estimator/calibrate.h"
+#include "estimator/diagnosis/device_class.h"
+
+namespace camgyro {
+
+// Fills total_covariance, device_class and systematic of the report. Returns a doubt in words where
+// a candidate of the catalogue is significant beyond doubt (kNoDoubt, all candidates together).
+//
+// With x the parameters and c the effects that are neither declared nor fitted, a fit without c is
+// off by X c to first order, where X = H_xx^-1 H_xc (score_test.h). Before the data c has the sizes
+// of the device's class; the residuals make of it a Gaussian around c_hat with covariance C. The
+// mean squared error of the fitted values, given the data, is then
+//   total = covariance + X C X' + (X c_hat)(X c_hat)'.
+// The last term stands because the values are not corrected by X c_hat: a correction by an effect
+// that may be another one is left to the diagnosis, which tests it on unseen frames.
+//
+// Nothing is filled for a recording that is too short for the scores (kLeastBlocks stretches), or
+// fitted with the residual of the transfer alone.
+std::optional<std::string> CheckModel(const Recording& recording, const CalibrateOptions& options,
+                                      DeviceClass device, CalibrationReport* report);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_MODEL_CHECK_H_

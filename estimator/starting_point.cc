@@ -1,0 +1,95 @@
+#include "estimator/starting_point.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "core/usual_focal.h"
+#include "estimator/window/estimation_input.h"
+
+namespace camgyro {
+
+Prior MakePrior(const Recording& recording, const StartResult& start) {
+  const CameraGuess& guess = recording.camera;
+  Prior result;
+  Calibration& prior = result.mean;
+  prior.width_px = guess.width_px;
+  prior.height_px = guess.height_px;
+  prior.distortion_model = guess.distortion_model;
+  const Eigen::Vector2d centre(0.5 * (guess.width_px - 1), 0.5 * (guess.height_px - 1));
+  const bool scanned = start.focal && start.focal->determined;
+  const double focal = scanned && !guess.focal_px ? start.focal->value_px : FocalToBeginWith(guess);
+  prior.lens = MakePinhole(focal, guess.principal_px.value_or(centre), guess.aspect_ratio);
+  for (size_t i = 0; i < guess.distortion.size() && i < 4; ++i) {
+    prior.lens[FirstCoefficient(guess.distortion_model) + static_cast<int>(i)] =
+        guess.distortion[i];
+  }
+  const double interval = std::min(1.0 / 30.0, MedianInterval(recording.frames));
+  prior.readout_s = guess.readout_s.value_or(0.5 * interval);
+  prior.delay_s = start.delay_middle_row_s - 0.5 * prior.readout_s;
+  prior.q_gyro_cam = start.q_gyro_cam;
+
+  const StateScales scales{focal, static_cast<double>(guess.width_px),
+                           std::hypot(guess.width_px, guess.height_px), interval};
+  std::array<bool, kStateSize> declared{};
+  declared[kStateFocal] = guess.focal_px.has_value();
+  declared[kStateReadout] = guess.readout_s.has_value();
+  StateVector& sigma = result.sigma;
+  for (size_t i = 0; i < kStateSize; ++i) {
+    const StateParameter& parameter = StateTable()[i];
+    sigma[static_cast<Eigen::Index>(i)] =
+        (declared[i] ? parameter.declared_sigma : parameter.usual_sigma).In(scales);
+  }
+  if (recording.HasOnlyAttitudes()) {
+    // An attitude has neither pixels nor rows: nothing depends on the lens, and the readout is 0.
+    prior.readout_s = 0.0;
+    prior.delay_s = start.delay_middle_row_s;
+    for (size_t i = 0; i < kStateSize; ++i) {
+      if (StateTable()[i].needs_pixels) sigma[static_cast<Eigen::Index>(i)] = 1.0;
+    }
+  }
+  auto rotation = sigma.segment<3>(kStateRotation);
+  rotation = start.rotation_sigma_rad.cwiseMax(rotation);
+  return result;
+}
+
+Status AddStartEffects(const Recording& recording, const StartResult& start,
+                       const std::string& list, const PairResidual& residual,
+                       Calibration* calibration) {
+  EffectSetup setup = MakeEffectSetup(recording, *calibration);
+  setup.clock_skew = start.clock_skew;
+  Result<EffectSet> effects = MakeEffects(list, setup);
+  if (!effects) return tl::unexpected(effects.error());
+  for (const EffectEntry& entry : EffectCatalogue()) {
+    if (!entry.found_at_start || effects->Has(entry.name) || !entry.found_at_start(setup)) continue;
+    const std::string shape = entry.shapes(setup).back();
+    const std::shared_ptr<const Effect> effect = entry.make(setup, shape);
+    if (effect->frees_frame_times() && !residual.facts().with_frame_times) continue;
+    effects->Add(&entry, shape, effect);
+  }
+  if (effects->items().empty()) return {};
+  calibration->effect_values = Eigen::VectorXd::Zero(effects->size());
+  for (const EffectSet::Item& item : effects->items()) {
+    item.effect->SetStart(calibration->effect_values.data() + item.first);
+  }
+  calibration->effects = std::make_shared<const EffectSet>(std::move(*effects));
+  return {};
+}
+
+Result<StartingPoint> MakeStartingPoint(const Recording& recording, const StartResult& start,
+                                        const std::string& effects, const PairResidual& residual) {
+  StartingPoint point;
+  point.prior = MakePrior(recording, start);
+  point.estimate = point.prior.mean;
+  point.estimate.bias_gyro_rad_s = start.bias_gyro_rad_s;
+  if (start.focal && start.focal->determined) point.estimate.lens[kFocal] = start.focal->value_px;
+  if (const Status added = AddStartEffects(recording, start, effects, residual, &point.estimate);
+      !added) {
+    return tl::unexpected(added.error());
+  }
+  return point;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,41 @@
+// From the start of a recording to where its fit begins.
+#ifndef CAMGYRO_ESTIMATOR_STARTING_POINT_H_
+#define CAMGYRO_ESTIMATOR_STARTING_POINT_H_
+
+#include <string>
+
+#include "core/calibration.h"
+#include "core/recording.h"
+#include "core/result.h"
+#include "estimator/start/find_start.h"
+#include "estimator/window/residuals/pair_residual.h"
+
+namespace camgyro {
+
+// The Gaussian prior of a calibration, as wide as the table of the state says (core/state.h).
+//   f: the declared one, else the scan's; c: the declared one, else the centre; t_r: declared, else
+//   half of the shorter of frame interval and 1/30 s; t_d: the search's; b_g: 0; q_c: the search's,
+//   with its sigma where that is wider than the table's. Attitudes: t_r 0, and units for what needs
+//   pixels.
+Prior MakePrior(const Recording& recording, const StartResult& start);
+
+// Puts effects into a calibration that has none: those of a list (MakeEffects), and those that the
+// start has found (EffectEntry::found_at_start) and the residual can have, with the values where a
+// fit begins. Errors: the list's.
+Status AddStartEffects(const Recording& recording, const StartResult& start,
+                       const std::string& list, const PairResidual& residual,
+                       Calibration* calibration);
+
+// Where a fit begins, and what is held to be likely before.
+struct StartingPoint {
+  Prior prior;
+  Calibration estimate;  // the prior's mean with the start's bias, focal length and effects
+};
+
+// MakePrior and AddStartEffects, with what else the start has found. Errors: of the effects' list.
+Result<StartingPoint> MakeStartingPoint(const Recording& recording, const StartResult& start,
+                                        const std::string& effects, const PairResidual& residual);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_STARTING_POINT_H_

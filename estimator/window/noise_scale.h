@@ -1,0 +1,45 @@
+// The noise of the pairs, from what a fit leaves.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_NOISE_SCALE_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_NOISE_SCALE_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/window/estimation_input.h"
+#include "estimator/window/residuals/pair_residual.h"
+
+namespace camgyro {
+
+// The noise of the pairs [px, rad of attitudes] from residuals of which the rates, fitted as well,
+// have taken a part.
+class NoiseScale {
+ public:
+  // Attitudes that follow the gyro itself agree with it far better than its noise: less than this
+  // share of it is never believed of them. It makes the variance of a turn 11 % larger. Smaller
+  // scales say no more, and the factorisation of the information fails.
+  static constexpr double kLeastShareOfGyro = 1.0 / 3.0;
+  // Exact pixels, of simulations: no tracker comes near [px].
+  static constexpr double kLeastPx = 1e-3;
+
+  // gyro_sigma_rad_s: of a gyro sample.
+  NoiseScale(const PairResidual::Facts& residual, const EstimationInput& input,
+             const std::vector<TimedPair>& pairs, const Eigen::Vector3d& gyro_sigma_rad_s);
+  // Of matches.
+  explicit NoiseScale(const PairResidual::Facts& residual);
+
+  // residuals: of each pair, in sigmas of `scale`, after a solve. Attitudes keep the share s^2 /
+  // (s^2 + g) of a misfit with the variance s^2 + g, s being the scale and g the gyro's variance of
+  // a turn.
+  double Next(const std::vector<std::vector<double>>& residuals, double scale) const;
+  // By what factor the scale of matches changes.
+  double Growth(const std::vector<std::vector<double>>& residuals, double scale) const;
+
+ private:
+  int lost_;  // degrees of freedom of a pair that are its own
+  double least_ = kLeastPx;
+  double gyro_variance_ = 0.0;  // of a turn between attitudes, per axis [rad^2]; 0 with pixels
+};
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_NOISE_SCALE_H_

@@ -1,0 +1,259 @@
+#include "estimator/window/rate_groups.h"
+
+#include <glog/logging.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "core/gyro_gap.h"
+#include "core/robust_statistics.h"
+#include "estimator/window/pair_blocks.h"
+#include "factors/bias_walk.h"
+#include "factors/gaussian_prior.h"
+#include "factors/gyro_rate.h"
+
+namespace camgyro {
+namespace {
+
+std::vector<double> Intervals(const std::deque<TimedRate>& samples) {
+  std::vector<double> intervals;
+  for (size_t i = 1; i < samples.size(); ++i) {
+    intervals.push_back(samples[i].time_s - samples[i - 1].time_s);
+  }
+  return intervals;
+}
+
+}  // namespace
+
+int PairGraphOptions::RateStep(double interval_s, double focal_px) const {
+  const double walk_px = gyro_sigma_rad_s.maxCoeff() * interval_s * focal_px;  // of a sample
+  const double samples = 12.0 * rate_step_px * rate_step_px / (walk_px * walk_px);
+  return std::max(1, static_cast<int>(std::min(samples, std::round(rate_step_s / interval_s))));
+}
+
+RateGroups::RateGroups(const PairGraphOptions& options, const Prior& prior,
+                       const Eigen::Vector3d& start_bias, std::shared_ptr<const EffectSet> effects)
+    : options_(options),
+      prior_bias_(prior.mean.bias_gyro_rad_s),
+      prior_bias_sigma_(prior.sigma.segment<3>(kStateBias)),
+      start_bias_(start_bias),
+      effects_(std::move(effects)) {}
+
+void RateGroups::Add(const TimedRate& rate) {
+  if (!samples_.empty()) CHECK_GT(rate.time_s, samples_.back().time_s);
+  samples_.push_back(rate);
+  // Estimated until the first group of rates is made: its size, and those of the groups that pairs
+  // share with it, follow from it.
+  if (next_group_ == 0 && samples_.size() >= 3 && samples_.size() <= 50) {
+    std::vector<double> intervals = Intervals(samples_);
+    // Stamps of samples that arrive in bunches have a median near zero.
+    const double mean_s =
+        (samples_.back().time_s - samples_.front().time_s) / static_cast<double>(intervals.size());
+    median_interval_s_ = std::max(MedianInPlace(&intervals), mean_s);
+  }
+}
+
+void RateGroups::Forget(double before_s) {
+  while (samples_.size() > 1 && samples_.front().time_s < before_s &&
+         (groups_.empty() || first_sample_ < groups_.begin()->second.first_sample)) {
+    samples_.pop_front();
+    ++first_sample_;
+  }
+}
+
+int RateGroups::Step(double focal_px) const {
+  if (effects_ != nullptr) {
+    for (const auto& item : effects_->items()) {
+      if (item.entry->part == ModelPart::kRate) return 1;
+    }
+  }
+  return options_.RateStep(median_interval_s_, focal_px);
+}
+
+Eigen::Vector3d RateGroups::ChainRateOf(int64_t number) const {
+  const TimedRate& now = sample(number);
+  if (number == first_sample_ ||
+      number + 1 == first_sample_ + static_cast<int64_t>(samples_.size())) {
+    return now.omega_gyro_rad_s;
+  }
+  const TimedRate &before = sample(number - 1), &after = sample(number + 1);
+  return ChainRate(before.omega_gyro_rad_s, now.omega_gyro_rad_s, after.omega_gyro_rad_s,
+                   now.time_s - before.time_s, after.time_s - now.time_s);
+}
+
+AddPairResult RateGroups::FindSamples(double from_s, double to_s, int64_t* first,
+                                      int64_t* last) const {
+  // One sample beyond, for the rate at the last one.
+  if (samples_.size() < 3 || samples_[samples_.size() - 2].time_s < to_s) {
+    return AddPairResult::kGyroTooLate;
+  }
+  if (samples_.front().time_s > from_s) return AddPairResult::kGyroTooEarly;
+  const auto by_time = [](const TimedRate& rate, double t) { return rate.time_s < t; };
+  // First needed: the last sample not after from_s; last needed: the first not before to_s.
+  const auto number_of = [&](double time_s) {
+    return first_sample_ +
+           (std::lower_bound(samples_.begin(), samples_.end(), time_s, by_time) - samples_.begin());
+  };
+  *first = number_of(from_s);
+  if (sample(*first).time_s > from_s) --*first;
+  *last = number_of(to_s);
+  for (int64_t i = *first; i < *last; ++i) {
+    const double gap = sample(i + 1).time_s - sample(i).time_s;
+    if (sample(i).saturated || sample(i + 1).saturated) return AddPairResult::kGyroGap;
+    if (gap > LongestGyroStep(median_interval_s_)) return AddPairResult::kGyroGap;
+  }
+  return AddPairResult::kAdded;
+}
+
+AddPairResult RateGroups::Plan(double from_s, double to_s, int step, const FactorGraph& graph,
+                               Cover* cover) const {
+  int64_t first = 0, last = 0;
+  if (const AddPairResult found = FindSamples(from_s, to_s, &first, &last);
+      found != AddPairResult::kAdded) {
+    return found;
+  }
+  // Groups that exist and reach into the span; then one new group with the rest.
+  cover->step = step;
+  std::vector<const Group*> used;
+  int64_t covered_until = first;  // first sample not yet covered
+  for (const auto& [id, group] : groups_) {
+    if (group.first_sample + group.count <= first) continue;
+    if (group.first_sample > last) break;
+    // A pair that goes back before the first group cannot be served: samples are missing.
+    if (used.empty() && group.first_sample > first) return AddPairResult::kGyroTooEarly;
+    used.push_back(&group);
+    cover->groups.push_back(id);
+    covered_until = group.first_sample + group.count;
+  }
+  if (covered_until <= last) {
+    PlanGroup(covered_until, last, graph, cover);
+    used.push_back(&cover->group);
+  }
+  for (const Group* group : used) {
+    cover->sizes.push_back(group->count);
+    for (int i = 0; i < group->count; ++i) {
+      cover->times_s.push_back(sample(group->first_sample + i).time_s);
+    }
+  }
+  if (step > 1) {
+    cover->base.resize(3, static_cast<Eigen::Index>(cover->times_s.size()));
+    Eigen::Index column = 0;
+    for (const Group* group : used) {
+      cover->base.middleCols(column, group->base.cols()) = group->base;
+      column += group->base.cols();
+    }
+  }
+  return AddPairResult::kAdded;
+}
+
+void RateGroups::PlanGroup(int64_t first, int64_t last, const FactorGraph& graph,
+                           Cover* cover) const {
+  Group& group = cover->group;
+  cover->lacks_group = true;
+  cover->groups.push_back(next_group_);
+  group.first_sample = first;
+  group.count = static_cast<int>(last + 1 - first);
+  group.bias_index =
+      static_cast<int64_t>(std::floor(sample(first).time_s / options_.bias_interval_s));
+  const Eigen::Vector3d bias = BiasAt(group.bias_index, graph);
+  Eigen::Matrix3Xd measured(3, group.count);
+  for (int i = 0; i < group.count; ++i) measured.col(i) = ChainRateOf(first + i);
+  Eigen::Matrix3Xd rates = measured.colwise() - bias;
+  if (cover->step > 1) {
+    // Corrections x of rates less the bias of now: x + bias - bias of now is noise.
+    std::vector<int> samples;
+    for (int i = 0; i < group.count; i += cover->step) {
+      samples.push_back(std::min(cover->step, group.count - i));
+    }
+    const auto values = static_cast<Eigen::Index>(samples.size());
+    group.base = rates;
+    cover->values = Eigen::VectorXd::Zero(3 * values);
+    cover->reading =
+        std::make_shared<GyroRate>(bias.replicate(1, values), samples, options_.gyro_sigma_rad_s);
+    return;
+  }
+  std::vector<double> times_s;
+  if (effects_ != nullptr) {
+    const PairEffects now{effects_.get(), graph.value(kEffectsBlock).data()};
+    for (int i = 0; i < group.count; ++i) {
+      times_s.push_back(sample(first + i).time_s);
+      rates.col(i) = TrueRate(now, times_s.back(), rates.col(i));
+    }
+  }
+  cover->reading_has_effects = effects_ != nullptr;
+  cover->values = Eigen::Map<const Eigen::VectorXd>(rates.data(), rates.size());
+  cover->reading =
+      std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s, effects_, std::move(times_s));
+}
+
+void RateGroups::AddTo(const Cover& cover, FactorGraph* graph) {
+  if (!cover.lacks_group) return;
+  CHECK_EQ(cover.groups.back(), next_group_);
+  const int64_t id = next_group_++;
+  AddBias(cover.group.bias_index, graph);
+  graph->AddBlock(RatesBlock(id), {Geometry::kEuclidean, cover.values, {}});
+  std::vector<BlockId> blocks = {RatesBlock(id), BiasBlock(cover.group.bias_index)};
+  if (cover.reading_has_effects) blocks.push_back(kEffectsBlock);
+  Group& group = groups_.emplace(id, cover.group).first->second;
+  group.factor = graph->AddFactor(cover.reading, std::move(blocks));
+}
+
+BlockId RateGroups::BiasBefore(int64_t index, const FactorGraph& graph) {
+  BlockId before = kLensBlock;
+  for (const auto& [id, block] : graph.blocks()) {
+    if (id.kind == BlockKind::kBias && id.index < index) before = id;
+  }
+  return before;
+}
+
+Eigen::Vector3d RateGroups::BiasAt(int64_t index, const FactorGraph& graph) const {
+  if (graph.Has(BiasBlock(index))) return graph.value(BiasBlock(index));
+  const BlockId before = BiasBefore(index, graph);
+  return before.kind == BlockKind::kBias ? Eigen::Vector3d(graph.value(before)) : start_bias_;
+}
+
+void RateGroups::AddBias(int64_t index, FactorGraph* graph) const {
+  if (graph->Has(BiasBlock(index))) return;
+  const BlockId before = BiasBefore(index, *graph);
+  graph->AddBlock(BiasBlock(index), {Geometry::kEuclidean, BiasAt(index, *graph), {}});
+  if (before.kind == BlockKind::kBias) {
+    graph->AddFactor(std::make_shared<BiasWalk>(
+                         options_.bias_walk_rad_s2_rtHz,
+                         options_.bias_interval_s * static_cast<double>(index - before.index)),
+                     {before, BiasBlock(index)});
+  } else {
+    graph->AddFactor(std::make_shared<GaussianPrior>(std::vector<GaussianPrior::Block>{
+                         {prior_bias_, prior_bias_sigma_, false}}),
+                     {BiasBlock(index)});
+  }
+}
+
+std::vector<int64_t> RateGroups::Unneeded(const std::set<int64_t>& needed) const {
+  std::vector<int64_t> ids;
+  for (auto it = groups_.begin(); it != groups_.end() && std::next(it) != groups_.end(); ++it) {
+    if (needed.count(it->first) > 0) break;
+    ids.push_back(it->first);
+  }
+  return ids;
+}
+
+std::vector<BlockId> RateGroups::BiasesOnlyOf(const std::vector<int64_t>& oldest,
+                                              const FactorGraph& graph) const {
+  const auto first_kept = std::next(groups_.begin(), static_cast<std::ptrdiff_t>(oldest.size()));
+  std::vector<BlockId> biases;
+  if (first_kept == groups_.end()) return biases;
+  for (const auto& [id, block] : graph.blocks()) {
+    if (id.kind == BlockKind::kBias && id.index < first_kept->second.bias_index) {
+      biases.push_back(id);
+    }
+  }
+  return biases;
+}
+
+void RateGroups::Drop(const std::vector<int64_t>& ids) {
+  for (const int64_t id : ids) groups_.erase(id);
+}
+
+}  // namespace camgyro

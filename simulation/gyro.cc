@@ -1,0 +1,148 @@
+#include "simulation/gyro.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/so3.h"
+#include "core/time.h"
+
+namespace camgyro::simulation {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// What the element sees at the sampling times: the rate in the gyro frame, low-passed if asked.
+class Element {
+ public:
+  Element(const Scenario& scenario, const Trajectory& trajectory)
+      : trajectory_(trajectory),
+        R_gyro_cam_(scenario.mount.q_gyro_cam.toRotationMatrix()),
+        time_constant_s_(scenario.effects.gyro_lowpass.time_constant_s) {
+    if (time_constant_s_ > 0.0) {  // settled before the first sample is read
+      time_s_ = -1.0;
+      filtered_ = Rate(time_s_);
+    }
+  }
+
+  // Times must not decrease.
+  Vector3d At(double time_s) {
+    if (time_constant_s_ <= 0.0) return Rate(time_s);
+    // y' = (w - y) / T over steps of at most 0.5 ms: exact decay, Simpson's rule for the input.
+    const int steps = static_cast<int>(std::ceil((time_s - time_s_) / 5e-4));
+    const double h = steps > 0 ? (time_s - time_s_) / steps : 0.0;
+    const double whole = std::exp(-h / time_constant_s_);
+    const double half = std::exp(-0.5 * h / time_constant_s_);
+    for (int i = 0; i < steps; ++i, time_s_ += h) {
+      filtered_ =
+          whole * filtered_ +
+          h / (6.0 * time_constant_s_) *
+              (whole * Rate(time_s_) + 4.0 * half * Rate(time_s_ + 0.5 * h) + Rate(time_s_ + h));
+    }
+    time_s_ = time_s;
+    return filtered_;
+  }
+
+ private:
+  Vector3d Rate(double time_s) const {
+    return R_gyro_cam_ * trajectory_.At(time_s).omega_cam_rad_s;
+  }
+
+  const Trajectory& trajectory_;
+  Matrix3d R_gyro_cam_;
+  double time_constant_s_;
+  double time_s_ = 0.0;
+  Vector3d filtered_ = Vector3d::Zero();
+};
+
+class Normal {
+ public:
+  explicit Normal(std::mt19937_64* random) : random_(random) {}
+  double operator()() { return normal_(*random_); }
+  Vector3d Vector() {
+    const double x = (*this)(), y = (*this)(), z = (*this)();
+    return {x, y, z};
+  }
+
+ private:
+  std::mt19937_64* random_;
+  std::normal_distribution<double> normal_;
+};
+
+// What an accelerometer at the gyro feels, in the gyro frame [m/s^2].
+Vector3d SpecificForce(const Scenario& scenario, const Trajectory& trajectory, double time_s) {
+  const Matrix3d R_gyro_cam = scenario.mount.q_gyro_cam.toRotationMatrix();
+  const Vector3d gravity_world(0.0, 9.80665, 0.0);
+  const CameraState state = trajectory.At(time_s);
+  const Vector3d omega = R_gyro_cam * state.omega_cam_rad_s;
+  const Vector3d alpha = R_gyro_cam * state.alpha_cam_rad_s2;
+  const Vector3d& arm = scenario.mount.p_gyro_cam_m;  // from the IMU to the camera
+  return R_gyro_cam * (state.R_world_cam.transpose() * (state.a_world_m_s2 - gravity_world)) -
+         alpha.cross(arm) - omega.cross(omega.cross(arm));
+}
+
+}  // namespace
+
+SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajectory,
+                           std::mt19937_64* random) {
+  const GyroOptions& options = scenario.gyro;
+  const Effects& effects = scenario.effects;
+  const double dt = 1.0 / options.rate_hz;
+  const auto count = static_cast<int64_t>(std::floor(
+                         (scenario.duration_s + 2.0 * scenario.margin_s) * options.rate_hz)) +
+                     1;
+
+  Matrix3d M = Matrix3d::Identity();
+  effects.ForEach([&](const auto& effect) { CallAddRateMatrix(effect, &M, 0); });
+  const double sigma_rate = options.noise_density_rad_s_rtHz * std::sqrt(options.rate_hz);
+  const double sigma_accel = options.accel_noise_density_m_s2_rtHz * std::sqrt(options.rate_hz);
+  const double sigma_walk = options.bias_walk_rad_s2_rtHz * std::sqrt(dt);
+
+  Element element(scenario, trajectory);
+  Normal normal(random);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  SimulatedGyro result;
+  Vector3d walk = Vector3d::Zero();
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t sampled_ns = StampAt(scenario.start_ns, static_cast<double>(i) * dt);
+    const double time_s = SecondsSince(scenario.start_ns, sampled_ns);
+    Vector3d bias = options.bias_rad_s + walk;
+    effects.ForEach([&](const auto& effect) { CallAddBias(effect, time_s, &bias, 0); });
+    result.bias_rad_s.push_back(bias);
+    walk += sigma_walk * normal.Vector();
+
+    Vector3d rate = Vector3d::Zero();
+    if (options.averaged) {  // Gauss-Legendre, 3 points over the interval about the stamp
+      const double offset = 0.5 * dt * std::sqrt(0.6);
+      rate = (5.0 * element.At(time_s - offset) + 8.0 * element.At(time_s) +
+              5.0 * element.At(time_s + offset)) /
+             18.0;
+    } else {
+      rate = element.At(time_s);
+    }
+    rate = M * rate + bias + sigma_rate * normal.Vector();
+    const RateInput input = {time_s, SpecificForce(scenario, trajectory, time_s)};
+    effects.ForEach([&](const auto& effect) { CallAddRate(effect, input, &rate, 0); });
+    const double limit = effects.gyro_saturation.limit_rad_s;
+    if (limit > 0.0) rate = rate.cwiseMax(-limit).cwiseMin(limit);
+    if (options.quantum_rad_s > 0.0) {
+      for (double& axis : rate)
+        axis = std::round(axis / options.quantum_rad_s) * options.quantum_rad_s;
+    }
+
+    // Draws are the same whatever is switched on, so that recordings differ by the effect alone.
+    const Vector3d accel_noise = sigma_accel * normal.Vector();
+    const double jitter_s = options.stamp_jitter_s * normal();
+    if (unit(*random) < options.drop_fraction && i > 0 && i + 1 < count) continue;
+    int64_t stamp_ns =
+        sampled_ns + (i > 0 ? static_cast<int64_t>(std::llround(jitter_s * 1e9)) : 0);
+    if (!result.gyro.empty()) stamp_ns = std::max(stamp_ns, result.gyro.back().stamp_ns + 1000);
+    result.gyro.push_back({stamp_ns, rate});
+    if (options.accelerometer) {
+      result.accel.push_back({stamp_ns, input.force_m_s2 + accel_noise});
+    }
+  }
+  return result;
+}
+
+}  // namespace camgyro::simulation

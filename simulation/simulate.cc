@@ -1,0 +1,305 @@
+#include "simulation/simulate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.h"
+#include "simulation/gyro.h"
+
+namespace camgyro::simulation {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// One stream of random numbers per purpose: switching one thing on leaves the others as they are.
+enum Stream : uint32_t { kMotionStream, kSceneStream, kGyroStream, kFrameStream, kTrackStream };
+
+std::mt19937_64 MakeRandom(uint64_t seed, Stream stream) {
+  std::seed_seq sequence{static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32),
+                         static_cast<uint32_t>(stream)};
+  return std::mt19937_64(sequence);
+}
+
+std::string Seconds(double seconds) { return std::to_string(seconds) + " s"; }
+
+// A structured scene must stay around the camera.
+Status CheckInside(const Simulated& simulated, const SceneOptions& scene) {
+  constexpr double kMargin = 0.2;  // [m]
+  for (const FrameTruth& frame : simulated.frames) {
+    const Vector3d& p = frame.state.p_world_m;
+    const std::string when = " at " + Seconds(frame.timing.stamp_s) +
+                             ": slow the motion, or send it round with motion.path_radius_m";
+    if (scene.kind == SceneKind::kRoom &&
+        ((0.5 * scene.room_m - p.cwiseAbs()).array() < kMargin).any()) {
+      return BadInput("the camera leaves the room" + when);
+    }
+    if (scene.kind == SceneKind::kFacade && p.z() > scene.distance_m - kMargin) {
+      return BadInput("the camera runs into the wall" + when);
+    }
+    if ((scene.kind == SceneKind::kFacade || scene.kind == SceneKind::kGround) &&
+        p.y() > scene.ground_m - kMargin) {
+      return BadInput("the camera sinks into the ground" + when);
+    }
+  }
+  return {};
+}
+
+struct Landmark {
+  int64_t id = 0;
+  Vector3d anchor_m;                         // at `since_s`, less the surface's offset
+  Vector3d velocity_m_s = Vector3d::Zero();  // of a moving point of the scene without surfaces
+  double since_s = 0.0;
+  int surface = -1;  // of the scene; -1: none
+};
+
+class Tracker {
+ public:
+  Tracker(const Scenario& scenario, const SimulatedCamera& camera, const Scene& scene)
+      : scenario_(scenario),
+        camera_(camera),
+        scene_(scene),
+        random_(MakeRandom(scenario.seed, kTrackStream)) {}
+
+  void Step(const FrameTiming& frame, std::vector<TrackedPoint>* tracks,
+            std::vector<PointTruth>* truths) {
+    std::vector<Landmark> seen;
+    for (Landmark& landmark : alive_) {
+      const double mean_life = scenario_.tracks.mean_life_frames;
+      if (mean_life > 0.0 && Unit() < 1.0 / mean_life) continue;
+      if (Observe(frame, /*is_new=*/false, &landmark, tracks, truths)) seen.push_back(landmark);
+    }
+    alive_ = std::move(seen);
+    for (int tries = 20 * scenario_.tracks.count;
+         tries > 0 && static_cast<int>(alive_.size()) < scenario_.tracks.count; --tries) {
+      Landmark landmark;
+      if (Spawn(frame, &landmark) && Observe(frame, /*is_new=*/true, &landmark, tracks, truths)) {
+        alive_.push_back(landmark);
+        ++next_id_;
+      }
+    }
+  }
+
+ private:
+  double Unit() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
+  Vector2d Noise(double sigma) {
+    const double u = normal_(random_), v = normal_(random_);
+    return sigma * Vector2d(u, v);
+  }
+
+  Vector3d PointAt(const Landmark& landmark, double time_s) const {
+    Vector3d point = landmark.anchor_m + landmark.velocity_m_s * (time_s - landmark.since_s);
+    if (landmark.surface >= 0) point += scene_.Offset(landmark.surface, time_s);
+    return point;
+  }
+
+  double RandomDepth() {
+    const double a = scenario_.scene.depth_m[0], b = scenario_.scene.depth_m[1], u = Unit();
+    switch (scenario_.scene.depth_law) {
+      case DepthLaw::kUniform:
+        return a + (b - a) * u;
+      case DepthLaw::kLogarithmic:
+        return a * std::pow(b / a, u);
+      case DepthLaw::kInverse:
+        return 1.0 / (1.0 / a + (1.0 / b - 1.0 / a) * u);
+    }
+    return a;
+  }
+
+  // Pins a landmark to what the picture shows at a pixel: the scene's surface there, or the given
+  // depth along the optical axis in a scene without surfaces.
+  bool Anchor(const FrameTiming& frame, const Vector2d& picture_px, double depth_m,
+              Landmark* landmark) const {
+    const std::optional<Vector2d> sensor_px = camera_.Destabilise(frame, picture_px);
+    if (!sensor_px) return false;
+    const double time_s = camera_.ExposureTime(frame, *sensor_px);
+    const std::optional<Vector3d> ray = camera_.Unproject(*sensor_px, time_s);
+    if (!ray) return false;
+    const CameraState state = camera_.trajectory().At(time_s);
+    const Vector3d direction = state.R_world_cam * *ray;
+    if (!scene_.surfaces().empty()) {
+      const std::optional<Hit> hit = scene_.Cast(state.p_world_m, direction, time_s);
+      if (!hit) return false;
+      depth_m = hit->distance;
+      landmark->surface = hit->surface;
+    }
+    landmark->anchor_m = state.p_world_m + depth_m * direction;
+    if (landmark->surface >= 0) landmark->anchor_m -= scene_.Offset(landmark->surface, time_s);
+    landmark->since_s = time_s;
+    return true;
+  }
+
+  bool Spawn(const FrameTiming& frame, Landmark* landmark) {
+    const CameraOptions& camera = scenario_.camera;
+    const double u = Unit() * (camera.width_px - 1), v = Unit() * (camera.height_px - 1);
+    const double depth_m = RandomDepth();
+    const bool moves = Unit() < scenario_.scene.moving_fraction;
+    const double direction = 2.0 * M_PI * Unit();
+    if (moves && scene_.surfaces().empty()) {
+      landmark->velocity_m_s = scenario_.scene.moving_speed_m_s *
+                               Vector3d(std::cos(direction), 0.0, std::sin(direction));
+    }
+    landmark->id = next_id_;
+    return Anchor(frame, {u, v}, depth_m, landmark);
+  }
+
+  bool Hidden(const SimulatedCamera::Observation& seen, const Vector3d& point) const {
+    if (scene_.surfaces().empty()) return false;
+    const Vector3d origin = camera_.trajectory().At(seen.time_s).p_world_m;
+    const std::optional<Hit> hit = scene_.Cast(origin, point - origin, seen.time_s);
+    return hit && hit->distance < 0.99;
+  }
+
+  bool Observe(const FrameTiming& frame, bool is_new, Landmark* landmark,
+               std::vector<TrackedPoint>* tracks, std::vector<PointTruth>* truths) {
+    constexpr double kMinDepth = 0.2;  // [m]
+    const auto seen =
+        camera_.Observe(frame, [&](double time_s) { return PointAt(*landmark, time_s); });
+    if (!seen || seen->depth_m < kMinDepth) return false;
+    PointTruth truth;
+    truth.world_m = PointAt(*landmark, seen->time_s);
+    truth.time_s = seen->time_s;
+    if (Hidden(*seen, truth.world_m)) return false;
+    const std::optional<Vector2d> px = camera_.Stabilise(frame, seen->sensor_px);
+    if (!px || !camera_.InPicture(*px)) return false;
+    truth.px = *px;
+    truth.moving = !landmark->velocity_m_s.isZero(0.0) ||
+                   (landmark->surface >= 0 &&
+                    scene_.surfaces()[static_cast<size_t>(landmark->surface)].moving());
+
+    // A re-anchoring tracker defines its point in the first picture: no noise there.
+    const TrackOptions& options = scenario_.tracks;
+    const Vector2d noise = Noise(options.noise_px), gross = Noise(options.outlier_px);
+    const bool defines = options.reanchored && is_new;
+    truth.outlier = Unit() < options.outlier_fraction && !defines;
+    Vector2d measured = truth.px;
+    if (!defines) measured += noise;
+    if (truth.outlier) measured += gross;
+    if (!camera_.InPicture(measured)) return false;
+    if (options.reanchored && !defines && !Anchor(frame, measured, seen->depth_m, landmark)) {
+      return false;
+    }
+    tracks->push_back({landmark->id, measured});
+    truths->push_back(truth);
+    return true;
+  }
+
+  const Scenario& scenario_;
+  const SimulatedCamera& camera_;
+  const Scene& scene_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::vector<Landmark> alive_;  // by ascending id
+  int64_t next_id_ = 0;
+};
+
+void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated* result) {
+  const CameraOptions& options = scenario.camera;
+  std::mt19937_64 random = MakeRandom(scenario.seed, kFrameStream);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::normal_distribution<double> normal;
+  std::exponential_distribution<double> latency;
+  const FrameStampJitter& jitter = scenario.effects.frame_stamp_jitter;
+  const int count = static_cast<int>(std::floor(scenario.duration_s * options.rate_hz)) + 1;
+  for (int i = 0; i < count; ++i) {
+    const double time_s = scenario.margin_s + i / options.rate_hz;  // first row, clean clock
+    const int64_t stamp_ns = StampAt(scenario.start_ns, time_s - options.delay_s);
+    const double swing = options.exposure_swing * std::sin(2.0 * M_PI * time_s / 5.0);
+    const int64_t exposure_ns = std::llround(1e9 * options.exposure_s * (1.0 + swing));
+    const double exposure_s = 1e-9 * static_cast<double>(exposure_ns);
+    const double late_s = jitter.latency_s > 0.0 ? jitter.latency_s * latency(random) : 0.0;
+    const int64_t jitter_ns = std::llround(1e9 * (jitter.spread_s * normal(random) + late_s));
+    if (unit(random) < options.drop_fraction && i > 0 && i + 1 < count) continue;
+
+    Frame frame;
+    frame.stamp_ns = stamp_ns + jitter_ns;
+    frame.exposure_s = exposure_s;
+    if (!result->recording.frames.empty()) {
+      frame.stamp_ns = std::max(frame.stamp_ns, result->recording.frames.back().stamp_ns + 1000);
+    }
+    FrameTruth truth;
+    truth.timing = result->camera->MakeFrame(SecondsSince(scenario.start_ns, stamp_ns), exposure_s);
+    truth.delay_s =
+        result->camera->Delay(truth.timing) - 1e-9 * static_cast<double>(frame.stamp_ns - stamp_ns);
+    const double first_row_s = result->camera->ExposureTime(truth.timing, {0.0, 0.0});
+    truth.focal_px = result->camera->Focal(first_row_s);
+    const double position = std::clamp(first_row_s * scenario.gyro.rate_hz, 0.0,
+                                       static_cast<double>(sensors.bias_rad_s.size()) - 1.0);
+    truth.bias_gyro_rad_s = sensors.bias_rad_s[static_cast<size_t>(position)];
+    truth.state = result->camera->trajectory().At(first_row_s);
+    result->recording.frames.push_back(frame);
+    result->frames.push_back(truth);
+  }
+}
+
+Calibration Truth(const Scenario& scenario) {
+  const CameraOptions& camera = scenario.camera;
+  const Effects& effects = scenario.effects;
+  Calibration truth;
+  truth.width_px = camera.width_px;
+  truth.height_px = camera.height_px;
+  const Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
+  truth.lens = MakePinhole(camera.focal_px, camera.principal_px.value_or(centre),
+                           effects.aspect_ratio.ratio);
+  if (effects.radial_distortion.kannala_brandt) {
+    const RadialDistortion& k = effects.radial_distortion;
+    truth.lens.segment<4>(kKb1) << k.k1, k.k2, k.k3, k.k4;
+    truth.distortion_model = DistortionModel::kKannalaBrandt;
+  } else {
+    truth.lens.segment<4>(kK1) << effects.radial_distortion.k1, effects.radial_distortion.k2,
+        effects.tangential_distortion.p1, effects.tangential_distortion.p2;
+    const bool distorted = !truth.lens.segment<4>(kK1).isZero(0.0);
+    truth.distortion_model = distorted ? DistortionModel::kRadTan : DistortionModel::kNone;
+  }
+  truth.readout_s = effects.readout_direction.reversed ? -camera.readout_s : camera.readout_s;
+  truth.delay_s = camera.delay_s;
+  truth.bias_gyro_rad_s = scenario.gyro.bias_rad_s;
+  truth.q_gyro_cam = scenario.mount.q_gyro_cam;
+  return truth;
+}
+
+}  // namespace
+
+Result<Simulated> SimulateSensors(const Scenario& scenario) {
+  Simulated result;
+  std::mt19937_64 random = MakeRandom(scenario.seed, kMotionStream);
+  Result<std::shared_ptr<const Trajectory>> trajectory = MakeTrajectory(scenario, &random);
+  if (!trajectory) return tl::unexpected(trajectory.error());
+  result.camera = std::make_shared<SimulatedCamera>(scenario, *trajectory);
+  random = MakeRandom(scenario.seed, kSceneStream);
+  result.scene = Scene::Make(scenario.scene, &random);
+  random = MakeRandom(scenario.seed, kGyroStream);
+  SimulatedGyro sensors = SimulateGyro(scenario, **trajectory, &random);
+  AddFrames(scenario, sensors, &result);
+  if (Status inside = CheckInside(result, scenario.scene); !inside) {
+    return tl::unexpected(inside.error());
+  }
+  Recording& recording = result.recording;
+  recording.gyro = std::move(sensors.gyro);
+  recording.accel = std::move(sensors.accel);
+  recording.gyro_info.noise_density_rad_s_rtHz = scenario.gyro.noise_density_rad_s_rtHz;
+  recording.gyro_info.random_walk_rad_s2_rtHz = scenario.gyro.bias_walk_rad_s2_rtHz;
+  result.truth = Truth(scenario);
+  recording.camera.width_px = scenario.camera.width_px;
+  recording.camera.height_px = scenario.camera.height_px;
+  if (scenario.camera.declare_intrinsics) {
+    recording.camera.focal_px = result.truth.lens[kFocal];
+    recording.camera.aspect_ratio = result.truth.lens[kAspect];
+    recording.camera.principal_px = result.truth.lens.segment<2>(kCx);
+  }
+  return result;
+}
+
+Result<Simulated> SimulateTracks(const Scenario& scenario) {
+  Result<Simulated> result = SimulateSensors(scenario);
+  if (!result) return result;
+  Tracker tracker(scenario, *result->camera, result->scene);
+  for (const FrameTruth& frame : result->frames) {
+    tracker.Step(frame.timing, &result->recording.tracks.emplace_back(),
+                 &result->points.emplace_back());
+  }
+  if (scenario.tracks.reanchored) result->recording.match_noise = MatchNoise::kSecondImage;
+  return result;
+}
+
+}  // namespace camgyro::simulation

@@ -1,0 +1,163 @@
+#include "estimator/window/pair_graph.h"
+
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <vector>
+
+#include "estimator/window/pair_blocks.h"
+#include "tests/estimator/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+using simulation::Simulated;
+using simulation::SimulateTracks;
+
+double CostOf(const PairGraph& graph) {
+  FactorGraph copy = graph.graph();
+  return copy.Solve({/*max_iterations=*/0}).initial_cost;
+}
+
+// Bit for bit.
+void ExpectSame(const PairGraph& a, const PairGraph& b) {
+  ASSERT_EQ(a.graph().blocks().size(), b.graph().blocks().size());
+  for (const auto& [id, block] : a.graph().blocks()) {
+    ASSERT_TRUE(b.graph().Has(id));
+    EXPECT_EQ(block.value, b.graph().value(id));
+  }
+  ASSERT_EQ(a.graph().factors().size(), b.graph().factors().size());
+  auto other = b.graph().factors().begin();
+  for (const auto& [key, factor] : a.graph().factors()) {
+    EXPECT_EQ(key, other->first);
+    EXPECT_EQ(factor.blocks, other->second.blocks);
+    ++other;
+  }
+  EXPECT_EQ(a.num_pairs(), b.num_pairs());
+  EXPECT_EQ(CostOf(a), CostOf(b));
+}
+
+// Two graphs with the same first pair, and the pairs to come. Rates end inside the last pair; one
+// sample in the fifth is missing, and so are its neighbours.
+struct Twins {
+  explicit Twins(const PairResidual& residual) {
+    const Simulated s = SimulateTracks(FarScenario(1.0)).value();
+    const EstimationInput input = MakeEstimationInput(s.recording);
+    pairs = input.pairs;
+    const Prior prior = StartOffTheTruth(s.truth);
+    PairGraphOptions options;
+    options.residual = &residual;
+    for (auto* graph : {&graph_, &untouched_}) {
+      *graph = std::make_unique<PairGraph>(prior.mean, prior, options);
+      for (const TimedRate& rate : input.rates) {
+        const double after_s = rate.time_s - pairs[5].time_a_s;
+        if (after_s > 0.0 && after_s < 0.05) continue;
+        if (rate.time_s < pairs.back().time_a_s) (*graph)->AddRate(rate);
+      }
+      EXPECT_EQ((*graph)->AddPair(pairs[1]), AddPairResult::kAdded);
+    }
+  }
+  PairGraph& graph() { return *graph_; }
+  PairGraph& untouched() { return *untouched_; }
+  std::vector<TimedPair> pairs;
+
+ private:
+  std::unique_ptr<PairGraph> graph_, untouched_;
+};
+
+TEST(PairGraph, ARefusedPairChangesNothing) {
+  for (const PairResidual* residual : {&ByPlane(), &ByTransfer()}) {
+    SCOPED_TRACE(residual->facts().name);
+    Twins twins(*residual);
+    TimedPair few = twins.pairs[2];
+    few.matches.resize(7);
+    EXPECT_EQ(twins.graph().AddPair(few), AddPairResult::kTooFewMatches);
+    TimedPair early = twins.pairs[2];
+    early.time_a_s -= 10.0;
+    EXPECT_EQ(twins.graph().AddPair(early), AddPairResult::kGyroTooEarly);
+    TimedPair before_the_groups = twins.pairs[0];
+    before_the_groups.id = 100;
+    EXPECT_EQ(twins.graph().AddPair(before_the_groups), AddPairResult::kGyroTooEarly);
+    EXPECT_EQ(twins.graph().AddPair(twins.pairs[5]), AddPairResult::kGyroGap);
+    EXPECT_EQ(twins.graph().AddPair(twins.pairs.back()), AddPairResult::kGyroTooLate);
+    ExpectSame(twins.graph(), twins.untouched());
+
+    // And it is no worse for it.
+    for (PairGraph* graph : {&twins.graph(), &twins.untouched()}) {
+      ASSERT_EQ(graph->AddPair(twins.pairs[2]), AddPairResult::kAdded);
+      ASSERT_TRUE(graph->Solve({4, 1e-4}).usable);
+      ASSERT_TRUE(graph->MarginalizeOldest().has_value());
+    }
+    ExpectSame(twins.graph(), twins.untouched());
+  }
+}
+
+// A reason that is found late, when the pair's rates are planned: three of ten matches have no
+// transfer, since the camera turns by 80 deg.
+TEST(PairGraph, APairThatIsRefusedForItsTransfersChangesNothing) {
+  Prior start;
+  start.mean.width_px = 640;
+  start.mean.height_px = 480;
+  start.mean.lens = MakePinhole(500.0, {319.5, 239.5});
+  start.sigma.setOnes();
+  PairGraphOptions options;
+  options.residual = &ByTransfer();
+  PairGraph graph(start.mean, start, options);
+  for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {42.0, 0.0, 0.0}});
+  TimedPair pair;
+  pair.time_a_s = 0.2;
+  pair.time_b_s = 0.2 + 1.0 / 30.0;
+  for (int i = 0; i < 10; ++i) pair.matches.push_back({{60.0 * i, 239.5}, {60.0 * i, 239.5}});
+  TimedPair wrong = pair;
+  for (size_t i = 0; i < 3; ++i) {
+    wrong.matches[i].px_a.y() = 475.0;
+    wrong.matches[i].px_b.y() = 5.0;
+  }
+  EXPECT_EQ(graph.AddPair(wrong), AddPairResult::kTooFewMatches);
+  EXPECT_EQ(graph.graph().blocks().size(), 3u);   // lens, shutter, rotation
+  EXPECT_EQ(graph.graph().factors().size(), 1u);  // their prior
+  EXPECT_EQ(graph.num_pairs(), 0);
+  EXPECT_EQ(graph.AddPair(pair), AddPairResult::kAdded);
+}
+
+// One pixel has no ray through the lens that effects make: that is what a user is told, by whatever
+// needs the pair's value, and nothing changes.
+TEST(PairGraph, APixelWithoutRayIsAnError) {
+  Prior prior;
+  Calibration& start = prior.mean;
+  start.width_px = 640;
+  start.height_px = 480;
+  start.lens = MakePinhole(400.0, {319.5, 239.5});
+  prior.sigma.setOnes();
+  start.effects = std::make_shared<const EffectSet>(
+      MakeEffects("radial_distortion:radtan", EffectSetup()).value());
+  start.effect_values = Eigen::Vector2d(-0.5, 0.0);  // folds 218 px from the centre
+  PairGraph graph(start, prior, {});
+  for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {0.3, 0.1, 0.0}});
+  TimedPair pair;
+  pair.time_a_s = 0.2;
+  pair.time_b_s = 0.2 + 1.0 / 30.0;
+  for (int i = 0; i < 12; ++i) {
+    pair.matches.push_back(
+        {{220.0 + 20.0 * i, 200.0 + 7.0 * i}, {223.0 + 20.0 * i, 205.0 + 7.0 * i}});
+  }
+  pair.matches[3].px_b << 5.0, 5.0;
+  ASSERT_EQ(graph.AddPair(pair), AddPairResult::kAdded);
+  const auto expect_error = [](const Status& status) {
+    ASSERT_FALSE(status.has_value());
+    EXPECT_EQ(status.error().kind, ErrorKind::kCannotEstimate);
+    EXPECT_THAT(status.error().message, ::testing::HasSubstr("no ray through the lens"));
+  };
+  Calibration estimate = graph.Estimate();
+  expect_error(graph.EstimateCovariance(2.0, 1.0, &estimate));
+  expect_error(graph.MarginalizeOldest());
+  EXPECT_EQ(graph.num_pairs(), 1);
+  EXPECT_TRUE(graph.Residuals(0, false).empty());
+  PairGraph empty(start, prior, {});
+  const Status none = empty.EstimateCovariance(2.0, 1.0, &estimate);
+  ASSERT_FALSE(none.has_value());
+  EXPECT_THAT(none.error().message, ::testing::HasSubstr("no pair of frames"));
+}
+
+}  // namespace
+}  // namespace camgyro
