@@ -21,6 +21,20 @@ double MedianIntervalOf(const std::vector<Stamped>& items) {
 
 }  // namespace
 
+std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
+                                  const std::vector<TrackedPoint>& b) {
+  std::vector<Match> matches;
+  for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
+    if (i->track_id == j->track_id) {
+      matches.push_back({i->px, j->px, j->noise_factor});
+      ++i, ++j;
+    } else {
+      i->track_id < j->track_id ? ++i : ++j;
+    }
+  }
+  return matches;
+}
+
 std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,
                                        int gap) {
   std::vector<FramePair> pairs;
@@ -29,14 +43,7 @@ std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoin
     FramePair pair;
     pair.frame_a = static_cast<int>(a);
     pair.frame_b = static_cast<int>(b);
-    auto it_b = tracks[b].begin();
-    for (const TrackedPoint& point : tracks[a]) {
-      while (it_b != tracks[b].end() && it_b->track_id < point.track_id) ++it_b;
-      if (it_b == tracks[b].end()) break;
-      if (it_b->track_id == point.track_id) {
-        pair.matches.push_back({point.px, it_b->px, it_b->noise_factor});
-      }
-    }
+    pair.matches = MatchesBetween(tracks[a], tracks[b]);
     pairs.push_back(std::move(pair));
   }
   return pairs;

@@ -160,7 +160,11 @@ struct Recording {
   }
 };
 
-// Matches between frames i and i + gap from tracks: every track seen in both.
+// Matches of the tracks seen in both of two frames; both by ascending id.
+std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
+                                  const std::vector<TrackedPoint>& b);
+
+// The same between frames i and i + gap, for all i.
 std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,
                                        int gap);
 

@@ -45,20 +45,6 @@ std::vector<bool> InliersByEpipolarLine(const FramePair& pair, const GyroRotatio
 
 }  // namespace
 
-std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
-                                  const std::vector<TrackedPoint>& b) {
-  std::vector<Match> matches;
-  for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
-    if (i->track_id == j->track_id) {
-      matches.push_back({i->px, j->px, j->noise_factor});
-      ++i, ++j;
-    } else {
-      i->track_id < j->track_id ? ++i : ++j;
-    }
-  }
-  return matches;
-}
-
 std::vector<TrackedPoint> TrackCleaner::Add(const std::vector<TrackedPoint>& points,
                                             const std::optional<GyroRotation>& rotation) {
   FramePair pair;

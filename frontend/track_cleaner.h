@@ -13,10 +13,6 @@
 
 namespace camgyro {
 
-// Matches of the tracks seen in both of two frames; both by ascending id.
-std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
-                                  const std::vector<TrackedPoint>& b);
-
 // From a wrong match on, a track goes on under a new id: what lies before and after it are two
 // features, as far as anybody knows.
 class TrackCleaner {

@@ -179,10 +179,7 @@ std::set<int> RegisteredFrames(int first, int last) {
 FramePair MatchFrames(int frame, const cv::Mat& before, const cv::Mat& now) {
   KltTracker tracker;
   const std::vector<TrackedPoint> a = tracker.Add(before), b = tracker.Add(now);
-  std::vector<FramePair> pairs = PairsFromTracks({a, b}, 1);
-  FramePair pair{frame - 1, frame, {}};
-  if (!pairs.empty()) pair.matches = std::move(pairs[0].matches);
-  return pair;
+  return {frame - 1, frame, MatchesBetween(a, b)};
 }
 
 Status CheckInput(const Recording& recording, const Calibration& calibration,
