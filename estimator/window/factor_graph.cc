@@ -67,6 +67,7 @@ FactorGraph::FactorGraph(const FactorGraph& other) : FactorGraph() {
 
 FactorGraph& FactorGraph::operator=(FactorGraph other) noexcept {
   std::swap(blocks_, other.blocks_);
+  std::swap(spare_directions_, other.spare_directions_);
   std::swap(factors_, other.factors_);
   std::swap(next_key_, other.next_key_);
   std::swap(subsets_, other.subsets_);
@@ -75,24 +76,33 @@ FactorGraph& FactorGraph::operator=(FactorGraph other) noexcept {
 }
 
 void FactorGraph::AddBlock(const BlockId& id, Block block) {
-  const auto [added, fresh] = blocks_.emplace(id, std::move(block));
-  CHECK(fresh) << "block exists";
-  AddToProblem(id, &added->second);
+  CHECK(!Has(id)) << "block exists";
+  if (block.geometry == Geometry::kDirection && !spare_directions_.empty()) {
+    auto node = std::move(spare_directions_.back());
+    spare_directions_.pop_back();
+    node.key() = id;
+    node.mapped() = block;  // a copy: the value keeps its place in memory
+    blocks_.insert(std::move(node));
+  } else {
+    blocks_.emplace(id, std::move(block));
+  }
+  AddToProblem(id, &blocks_.at(id));
 }
 
 void FactorGraph::AddToProblem(const BlockId& id, Block* block) {
   double* const values = block->value.data();
   const auto size = static_cast<int>(block->value.size());
+  // Not AddParameterBlock with a manifold, see spare_directions_.
+  problem_->AddParameterBlock(values, size);
   if (block->tangent_size() == 0) {
-    problem_->AddParameterBlock(values, size);
     problem_->SetParameterBlockConstant(values);
   } else if (!block->constant.empty()) {
     CHECK(block->geometry == Geometry::kEuclidean);
     auto subset = std::make_shared<ceres::SubsetManifold>(size, block->constant);
-    problem_->AddParameterBlock(values, size, subset.get());
+    problem_->SetManifold(values, subset.get());
     subsets_[id] = std::move(subset);
-  } else {
-    problem_->AddParameterBlock(values, size, ManifoldOf(block->geometry));
+  } else if (ceres::Manifold* const manifold = ManifoldOf(block->geometry)) {
+    problem_->SetManifold(values, manifold);
   }
 }
 
@@ -268,7 +278,9 @@ Result<int> FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
   for (const BlockId& id : leaving) {
     problem_->RemoveParameterBlock(value(id).data());
     subsets_.erase(id);
-    blocks_.erase(id);
+    auto node = blocks_.extract(id);
+    if (node.mapped().geometry == Geometry::kDirection)
+      spare_directions_.push_back(std::move(node));
   }
   return undetermined;
 }

@@ -165,6 +165,9 @@ class FactorGraph {
   void AddToProblem(Factor* factor);
 
   std::map<BlockId, Block> blocks_;  // nodes: values stay where they are
+  // Directions that have left, for those that come: ceres::Problem 2.1 keeps an entry for every
+  // address that ever had a manifold, so that new addresses would let it grow with each pair.
+  std::vector<std::map<BlockId, Block>::node_type> spare_directions_;
   std::map<FactorKey, Factor> factors_;
   FactorKey next_key_ = 0;
   std::map<BlockId, std::shared_ptr<ceres::Manifold>> subsets_;  // of blocks partly constant
