@@ -1,6 +1,6 @@
 // The effects of the catalogue that the simulator can make, all absent by default. Causes and
-// realistic sizes of each are in docs/simulate.md. Times t are seconds after the first gyro stamp,
-// on the gyro clock.
+// realistic sizes of each are in tools/scenarios/effect_NAME.yaml. Times t are seconds after the
+// first gyro stamp, on the gyro clock.
 #ifndef CAMGYRO_SIMULATION_EFFECTS_ALL_EFFECTS_H_
 #define CAMGYRO_SIMULATION_EFFECTS_ALL_EFFECTS_H_
 
