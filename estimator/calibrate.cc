@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <future>
 #include <limits>
 #include <utility>
 
 #include "core/format.h"
+#include "core/parallel.h"
 #include "estimator/halves.h"
 
 namespace camgyro {
@@ -292,11 +292,22 @@ class CalibrationJob {
     return Refine(input_, input_.pairs, from, report_.prior, options);
   }
 
-  // Beside the fit of all pairs, each half alone. The arguments have to outlive what is returned.
-  std::future<Halves> BeginHalves(const Calibration& from, const RefinementOptions& options) const {
-    if (static_cast<int>(input_.pairs.size()) < kMinPairsForUnseen) return {};
-    return std::async(std::launch::async, FitHalves, std::cref(input_), std::cref(from),
-                      std::cref(report_.prior), std::cref(options));
+  // All pairs, and beside them each half alone.
+  Result<Refined> RefineWithHalves(const RefinementOptions& options, const Calibration& from,
+                                   const std::function<Result<Refined>()>& all,
+                                   Halves* halves) const {
+    if (static_cast<int>(input_.pairs.size()) < kMinPairsForUnseen) return all();
+    HalvesFit fit(input_, from, report_.prior, options);
+    Result<Refined> refined = CannotEstimate("");
+    ParallelFor(3, [&](size_t which) {
+      if (which == 0) {
+        refined = all();
+      } else {
+        fit.Fit(which - 1);
+      }
+    });
+    *halves = fit.Compare();
+    return refined;
   }
 
   Status Refinement() {
@@ -314,16 +325,23 @@ class CalibrationJob {
     }
     RefinementOptions dropping = refinement;
     dropping.graph.drop_without_ray = true;
-    std::future<Halves> halves_fit = BeginHalves(from, refinement);
-    Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
-    if (!refined && report_.online) {  // a window that has run away, to a lens without rays
-      refined = RefineWith(refinement, from_start_, std::nullopt);
+    Halves halves;
+    bool leads_nowhere = false;
+    const auto all = [&] {
+      Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
+      leads_nowhere = !refined && report_.online;  // a window that has run away, to a lens without
+      if (leads_nowhere) refined = RefineWith(refinement, from_start_, std::nullopt);  // rays
+      return refined;
+    };
+    Result<Refined> refined = RefineWithHalves(refinement, from, all, &halves);
+    if (leads_nowhere) {
       report_.notes.push_back(
           "the online estimate leads nowhere; all frames fitted from the start");
     }
     if (!refined && from.effects != nullptr) {
-      refined = RefineWith(dropping, from, dropping.graph.sigma);
-      halves_fit = BeginHalves(from, dropping);
+      refined = RefineWithHalves(
+          dropping, from, [&] { return RefineWith(dropping, from, dropping.graph.sigma); },
+          &halves);
       if (refined) {
         report_.notes.push_back(
             "matches where the lens of the start has no ray, at the edge of the picture, are left "
@@ -337,7 +355,7 @@ class CalibrationJob {
     report_.frame_times = refined->frame_times;
     report_.converged = refined->converged;
     Tell("refinement", 0.6);
-    TakeHalves(halves_fit.valid() ? halves_fit.get() : Halves());
+    TakeHalves(halves);
     clock_.Finish("refinement");
     return {};
   }

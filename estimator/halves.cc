@@ -2,9 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <vector>
 
 namespace camgyro {
 namespace {
@@ -24,39 +22,42 @@ double HalvesChi2(const Calibration& first, const Calibration& second) {
 
 }  // namespace
 
-Halves FitHalves(const EstimationInput& input, const Calibration& from, const Prior& prior,
-                 const RefinementOptions& refinement) {
+HalvesFit::HalvesFit(const EstimationInput& input, const Calibration& from, const Prior& prior,
+                     const RefinementOptions& refinement)
+    : input_(input), from_(from), prior_(prior), refinement_(refinement) {
   const auto middle = input.pairs.begin() + static_cast<std::ptrdiff_t>(input.pairs.size() / 2);
-  std::array<std::vector<TimedPair>, 2> halves;
-  halves[0].assign(input.pairs.begin(), middle);
+  halves_[0].assign(input.pairs.begin(), middle);
   for (auto pair = middle; pair != input.pairs.end(); ++pair) {
-    if (pair->time_a_s > halves[0].back().time_b_s) halves[1].push_back(*pair);
+    if (pair->time_a_s > halves_[0].back().time_b_s) halves_[1].push_back(*pair);
   }
-  RefinementOptions options = refinement;
-  options.max_rounds = std::min(4, refinement.max_rounds);
-  options.cluster_s = 0.5 * refinement.cluster_s;
-  std::array<Calibration, 2> fits;
+}
+
+void HalvesFit::Fit(size_t half) {
+  RefinementOptions options = refinement_;
+  options.max_rounds = std::min(4, refinement_.max_rounds);
+  options.cluster_s = 0.5 * refinement_.cluster_s;
+  const Result<Refined> fit = Refine(input_, halves_.at(half), from_, prior_, options);
+  if (!fit) return;
+  fits_.at(half) = fit->calibration;
+  const std::vector<TimedPair>& other = halves_.at(1 - half);
+  if (other.empty() || other.front().matches.empty()) return;  // attitudes
+  others_.at(half) =
+      EvaluateUnseen(input_, other, fit->calibration, fit->quality.noise_px, refinement_.graph);
+}
+
+Halves HalvesFit::Compare() const {
   UnseenFit unseen;
-  bool both = true;
-  for (size_t h = 0; h < 2; ++h) {
-    const Result<Refined> half = Refine(input, halves[h], from, prior, options);
-    if (!half) {
-      both = false;
-      continue;
-    }
-    fits[h] = half->calibration;
-    if (halves[1 - h].empty() || halves[1 - h].front().matches.empty()) continue;  // attitudes
-    const UnseenFit other = EvaluateUnseen(input, halves[1 - h], half->calibration,
-                                           half->quality.noise_px, refinement.graph);
+  for (const auto& other : others_) {
+    if (!other) continue;
     unseen.rms_px = std::sqrt((unseen.matches * unseen.rms_px * unseen.rms_px +
-                               other.matches * other.rms_px * other.rms_px) /
-                              std::max(1, unseen.matches + other.matches));
-    unseen.matches += other.matches;
-    unseen.pairs += other.pairs;
+                               other->matches * other->rms_px * other->rms_px) /
+                              std::max(1, unseen.matches + other->matches));
+    unseen.matches += other->matches;
+    unseen.pairs += other->pairs;
   }
   Halves result;
   if (unseen.matches > 0) result.unseen = unseen;
-  if (both) result.chi2 = HalvesChi2(fits[0], fits[1]);
+  if (fits_[0] && fits_[1]) result.chi2 = HalvesChi2(*fits_[0], *fits_[1]);
   return result;
 }
 

@@ -3,7 +3,10 @@
 #ifndef CAMGYRO_ESTIMATOR_HALVES_H_
 #define CAMGYRO_ESTIMATOR_HALVES_H_
 
+#include <array>
+#include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "core/calibration.h"
 #include "estimator/window/refinement.h"
@@ -21,8 +24,25 @@ struct Halves {
 
 // Each half of the pairs is fitted alone, and the other one tells how well. The pairs across the
 // middle belong to neither, so that no frame is in both.
-Halves FitHalves(const EstimationInput& input, const Calibration& from, const Prior& prior,
-                 const RefinementOptions& refinement);
+class HalvesFit {
+ public:
+  // The arguments have to outlive this.
+  HalvesFit(const EstimationInput& input, const Calibration& from, const Prior& prior,
+            const RefinementOptions& refinement);
+  // Fits half 0 or 1: beside the other, if it likes to.
+  void Fit(size_t half);
+  // Once both are fitted.
+  Halves Compare() const;
+
+ private:
+  const EstimationInput& input_;
+  const Calibration& from_;
+  const Prior& prior_;
+  const RefinementOptions& refinement_;
+  std::array<std::vector<TimedPair>, 2> halves_;
+  std::array<std::optional<Calibration>, 2> fits_;
+  std::array<std::optional<UnseenFit>, 2> others_;  // of each fit, in the other half
+};
 
 }  // namespace camgyro
 

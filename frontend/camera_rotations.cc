@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/lens.h"
+#include "core/parallel.h"
 #include "frontend/two_view_rotation.h"
 
 namespace camgyro {
@@ -45,10 +47,13 @@ std::vector<CameraRotation> CameraRotationsOf(const std::vector<FramePair>& pair
     lens[FirstCoefficient(camera.distortion_model) + static_cast<int>(i)] = camera.distortion[i];
   }
   const Lens& model = GetLens(camera.distortion_model);
+  std::vector<std::optional<CameraRotation>> found(pairs.size());
+  ParallelFor(pairs.size(),
+              [&](size_t i) { found[i] = EstimateCameraRotation(pairs[i], model, lens); });
   std::vector<CameraRotation> rotations;
   rotations.reserve(pairs.size());
-  for (const FramePair& pair : pairs) {
-    if (auto rotation = EstimateCameraRotation(pair, model, lens)) rotations.push_back(*rotation);
+  for (const auto& rotation : found) {
+    if (rotation) rotations.push_back(*rotation);
   }
   return rotations;
 }

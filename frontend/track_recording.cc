@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/format.h"
+#include "core/parallel.h"
 #include "core/robust_statistics.h"
 #include "frontend/frame_source.h"
 #include "frontend/gyro_rotation.h"
@@ -28,6 +29,27 @@ constexpr double kMinMotionPx = 0.3;
 constexpr int kBlockPx = 16;
 constexpr double kLeastContrast = 5.0;
 constexpr double kDarkest = 0.02;
+
+// Decoded, but not yet tracked: the decoder has a few milliseconds more or less per picture.
+constexpr size_t kMostDecoded = 4;
+
+// A frame of the recording as its file has it.
+struct DecodedFrame {
+  Result<bool> more = false;  // false: there is none
+  cv::Mat gray;               // empty: not to be tracked
+  std::string complaint;      // about its size
+  bool shows_nothing = false;
+};
+
+DecodedFrame DecodeNext(FrameSource* source) {
+  DecodedFrame frame;
+  frame.more = source->NextOfAnySize(&frame.gray, &frame.complaint);
+  if (frame.more && *frame.more && !frame.gray.empty() && ShowsNothing(frame.gray)) {
+    frame.shows_nothing = true;
+    frame.gray.release();
+  }
+  return frame;
+}
 
 std::optional<GyroRotation> RotationBetween(const Recording& recording,
                                             const Calibration* calibration, size_t frame_a) {
@@ -66,6 +88,34 @@ struct UnusableFrames {
     return {};
   }
 };
+
+// The points of every frame, as the tracker has them. Errors of the files.
+Status FollowCorners(const TrackerOptions& options, const Calibration* calibration,
+                     const TrackingProgress& progress, const Recording& recording,
+                     FrameSource* source, std::vector<std::vector<TrackedPoint>>* tracks,
+                     UnusableFrames* unusable) {
+  KltTracker tracker(options);
+  MadeAhead<DecodedFrame> decoded(kMostDecoded, [source] { return DecodeNext(source); });
+  for (size_t i = 0; i < recording.frames.size(); ++i) {
+    const DecodedFrame frame = decoded.Take();
+    if (!frame.more) return tl::unexpected(frame.more.error());
+    if (!*frame.more) break;
+    if (frame.shows_nothing) {
+      unusable->showing_nothing.push_back(static_cast<int>(i));
+    } else if (frame.gray.empty()) {
+      if (unusable->of_another_size.empty()) unusable->first_size = frame.complaint;
+      unusable->of_another_size.push_back(static_cast<int>(i));
+    }
+    PointPredictor predictor;
+    std::optional<GyroRotation> rotation;
+    if (i > 0) rotation = RotationBetween(recording, calibration, i - 1);
+    if (rotation) predictor = [&](const Eigen::Vector2d& px) { return rotation->Predict(px); };
+    tracks->push_back(tracker.Add(frame.gray, predictor));
+    if (progress)
+      progress(static_cast<double>(i + 1) / static_cast<double>(recording.frames.size()));
+  }
+  return {};
+}
 
 // Returns the share of wrong matches.
 double CutTracksAtOutliers(const Calibration* calibration, Recording* recording) {
@@ -131,28 +181,12 @@ Result<TrackingSummary> TrackRecording(const TrackerOptions& options,
   const auto begin = std::chrono::steady_clock::now();
   Result<std::unique_ptr<FrameSource>> source = OpenFrames(*recording);
   if (!source) return tl::unexpected(source.error());
-  KltTracker tracker(options);
   std::vector<std::vector<TrackedPoint>> tracks;
   UnusableFrames unusable;
-  for (size_t i = 0; i < recording->frames.size(); ++i) {
-    cv::Mat gray;
-    std::string complaint;
-    const Result<bool> more = (*source)->NextOfAnySize(&gray, &complaint);
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
-    if (gray.empty()) {
-      if (unusable.of_another_size.empty()) unusable.first_size = complaint;
-      unusable.of_another_size.push_back(static_cast<int>(i));
-    } else if (ShowsNothing(gray)) {
-      unusable.showing_nothing.push_back(static_cast<int>(i));
-      gray.release();
-    }
-    PointPredictor predictor;
-    std::optional<GyroRotation> rotation;
-    if (i > 0) rotation = RotationBetween(*recording, calibration, i - 1);
-    if (rotation) predictor = [&](const Eigen::Vector2d& px) { return rotation->Predict(px); };
-    tracks.push_back(tracker.Add(gray, predictor));
-    if (progress) progress(static_cast<double>(i + 1) / recording->frames.size());
+  if (Status followed = FollowCorners(options, calibration, progress, *recording, source->get(),
+                                      &tracks, &unusable);
+      !followed) {
+    return tl::unexpected(followed.error());
   }
   recording->tracks = std::move(tracks);
   recording->matches.clear();

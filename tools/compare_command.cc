@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <sstream>
-#include <thread>
 
+#include "core/parallel.h"
 #include "pipeline/result_files.h"
 #include "tools/commands.h"
 #include "tools/comparison/comparison_report.h"
@@ -82,8 +82,8 @@ Status ReadFlags(Plan* plan) {
   if (FLAGS_ekf_iterations < 1) return BadUsage("--ekf_iterations: expected 1 or more");
   if (!(FLAGS_ekf_sigma_px > 0.0)) return BadUsage("--ekf_sigma_px: expected a positive number");
   if (!(FLAGS_ekf_gate >= 0.0)) return BadUsage("--ekf_gate: expected 0 (none) or more");
-  plan->jobs = FLAGS_jobs > 0 ? FLAGS_jobs
-                              : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  plan->jobs = FLAGS_jobs > 0 ? FLAGS_jobs : MostThreads();
+  LimitThreads(MostThreads() / plan->jobs);  // of each process
   plan->ekf.triplets = FLAGS_ekf_triplets;
   plan->ekf.sigma_px = FLAGS_ekf_sigma_px;
   plan->ekf.gate_sigmas = FLAGS_ekf_gate;

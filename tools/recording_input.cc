@@ -2,7 +2,10 @@
 
 #include <gflags/gflags.h>
 
+#include <opencv2/core/utility.hpp>
+
 #include "core/format.h"
+#include "core/parallel.h"
 #include "core/time.h"
 #include "frontend/readers/read_recording.h"
 #include "tools/command_line.h"
@@ -18,11 +21,13 @@ DEFINE_double(delay_ms, 0.0,
 DEFINE_string(stamps, "auto",
               "gyro stamps: recorded, repaired (laid on the sampling clock behind them), or auto: "
               "repaired where they are clearly times of arrival");
+DEFINE_int32(threads, 0,
+             "threads to work in; without: one per core. The result is the same with any number");
 DEFINE_bool(strict, false, "refuse recordings whose data have to be repaired");
 
 namespace camgyro {
 std::vector<std::string> InputFlags() {
-  return {"focal_px", "readout_ms", "delay_ms", "stamps", "strict"};
+  return {"focal_px", "readout_ms", "delay_ms", "stamps", "strict", "threads"};
 }
 
 Result<ReadOptions> ReadOptionsFromFlags() {
@@ -41,6 +46,11 @@ Result<ReadOptions> ReadOptionsFromFlags() {
 Result<Recording> OpenRecording(const std::string& path) {
   if (FlagGiven("focal_px") && !(FLAGS_focal_px > 0.0)) {
     return BadUsage("--focal_px: expected a positive number");
+  }
+  if (FlagGiven("threads")) {
+    if (FLAGS_threads < 1) return BadUsage("--threads: expected at least 1");
+    LimitThreads(FLAGS_threads);
+    cv::setNumThreads(FLAGS_threads);
   }
   const Result<ReadOptions> options = ReadOptionsFromFlags();
   if (!options) return tl::unexpected(options.error());

@@ -88,7 +88,7 @@ Command TrackCommand() {
   command.summary =
       "follows corners through the pictures: writes cam0/tracks.csv into the recording (or --out), "
       "where other commands take it instead of the pictures";
-  command.flags = {"out", "calibration", "max_points", "stamps", "strict", "quiet"};
+  command.flags = {"out", "calibration", "max_points", "stamps", "strict", "threads", "quiet"};
   command.run = RunTrack;
   return command;
 }

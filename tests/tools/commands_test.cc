@@ -45,7 +45,7 @@ void ExpectTheTruth(const YAML::Node& calibration) {
 
 TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
   Simulate(kHandheldScenario, "a");
-  const RunResult run = Run("calibrate a --out=result");
+  const RunResult run = Run("calibrate a --out=result --threads=1");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("focal length"), HasSubstr("readout time"), HasSubstr("±"),
                              HasSubstr("unseen"), HasSubstr("written    result/calibration.yaml")));
@@ -77,8 +77,8 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
                                   "bias_y,bias_z,q_w,q_x,q_y,q_z,sigma_focal_px,"));
   EXPECT_THAT(ReadFile(Path("result/delay.csv")), testing::StartsWith("#delay_s,unexplained\n"));
 
-  // Again, and quietly: the same bytes.
-  const RunResult again = Run("calibrate a --out=again --quiet");
+  // Again, quietly, and in three threads: the same bytes.
+  const RunResult again = Run("calibrate a --out=again --quiet --threads=3");
   ASSERT_EQ(again.exit_code, 0);
   for (const char* name : {"calibration.yaml", "trace.csv", "delay.csv"}) {
     EXPECT_EQ(ReadFile(Path(std::string("again/") + name)),
@@ -114,13 +114,13 @@ TEST_F(CommandsTest, DelayFindsTheMiddleRowsDelay) {
 
 TEST_F(CommandsTest, TrackWritesTracksThatReplaceThePictures) {
   Simulate(kVideo, "a");
-  const RunResult run = Run("track a");
+  const RunResult run = Run("track a --threads=2");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("written    a/cam0/tracks.csv"));
   const std::string tracks = ReadFile(Path("a/cam0/tracks.csv"));
   EXPECT_THAT(tracks, testing::StartsWith("#timestamp [ns],track_id,u [px],v [px]\n"));
-  // The same again, from the pictures and not from the tracks that are there now.
-  ASSERT_EQ(Run("track a --out=b").exit_code, 0);
+  // The same again in one thread, from the pictures and not from the tracks that are there now.
+  ASSERT_EQ(Run("track a --out=b --threads=1").exit_code, 0);
   EXPECT_EQ(ReadFile(Path("b/cam0/tracks.csv")), tracks);
 }
 
