@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -30,7 +32,21 @@ bool TakeHelper() {
   return false;
 }
 
-void GiveHelperBack() { --Helpers(); }
+// Runs the work in a thread, if one is free; else the future has no state.
+std::future<void> InHelper(std::function<void()> work) {
+  if (!TakeHelper()) return {};
+  try {
+    return std::async(std::launch::async, [work = std::move(work)] {
+      struct GiveBack {
+        ~GiveBack() { --Helpers(); }
+      } const give_back;
+      work();
+    });
+  } catch (const std::system_error&) {  // the system has no thread left
+    --Helpers();
+    return {};
+  }
+}
 
 }  // namespace
 
@@ -43,32 +59,22 @@ void ParallelFor(size_t count, const std::function<void(size_t)>& body) {
   const auto work = [&] {
     for (size_t i = next++; i < count; i = next++) body(i);
   };
-  std::vector<std::thread> threads;
-  while (threads.size() + 1 < count && TakeHelper()) {
-    threads.emplace_back([&] {
-      work();
-      GiveHelperBack();
-    });
+  std::vector<std::future<void>> helpers;  // their destructors wait, should work() throw
+  while (helpers.size() + 1 < count) {
+    std::future<void> helper = InHelper(work);
+    if (!helper.valid()) break;
+    helpers.push_back(std::move(helper));
   }
   work();
-  for (std::thread& thread : threads) thread.join();
+  for (std::future<void>& helper : helpers) helper.get();
 }
 
-Beside::Beside(std::function<void()> work) : work_(std::move(work)), has_thread_(TakeHelper()) {
-  if (!has_thread_) return;
-  thread_ = std::thread([this] {
-    work_();
-    GiveHelperBack();
-  });
-}
-
-Beside::~Beside() {
-  if (thread_.joinable()) thread_.join();
-}
+Beside::Beside(std::function<void()> work)
+    : work_(std::move(work)), done_(InHelper(work_)), has_thread_(done_.valid()) {}
 
 void Beside::Wait() {
   if (has_thread_) {
-    thread_.join();
+    done_.get();
   } else {
     work_();
   }

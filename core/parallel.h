@@ -5,9 +5,10 @@
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
+#include <exception>
 #include <functional>
+#include <future>
 #include <mutex>
-#include <thread>
 #include <utility>
 
 namespace camgyro {
@@ -20,30 +21,28 @@ int MostThreads();
 
 // Calls body(0) to body(count - 1), each once, in any order and in as many threads as are free;
 // returns when all are done. What a body writes is its own, so that the order does not matter.
+// Passes on what a body throws, when no body runs any more.
 void ParallelFor(size_t count, const std::function<void(size_t)>& body);
 
 // A function that runs beside the caller if a thread is free when this is made, else when it is
 // waited for; not at all if nobody waits.
 class Beside {
  public:
-  explicit Beside(std::function<void()> work);
-  ~Beside();  // waits for the thread
-  Beside(const Beside&) = delete;
-  Beside& operator=(const Beside&) = delete;
+  explicit Beside(std::function<void()> work);  // the destructor waits for the thread
 
   bool has_thread() const { return has_thread_; }
-  // Returns when the function has returned; the first time only.
+  // Returns when the function has returned, and passes on what it throws; to be called once.
   void Wait();
 
  private:
   std::function<void()> work_;
+  std::future<void> done_;
   bool has_thread_ = false;
-  std::thread thread_;
 };
 
 // What a function gives, call after call, made up to `most` calls ahead of who takes it if a thread
 // is free, else on demand. It is called more often than somebody takes, and not after the
-// destructor has returned.
+// destructor has returned. What it throws, Take() throws in its place.
 template <typename T>
 class MadeAhead {
  public:
@@ -58,7 +57,8 @@ class MadeAhead {
   T Take() {
     if (!maker_.has_thread()) return make_();
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [this] { return !made_.empty(); });
+    changed_.wait(lock, [this] { return !made_.empty() || failure_; });
+    if (made_.empty()) std::rethrow_exception(failure_);
     T first = std::move(made_.front());
     made_.pop_front();
     changed_.notify_all();
@@ -67,6 +67,15 @@ class MadeAhead {
 
  private:
   void MakeAll() {
+    try {
+      MakeUntilStopped();
+    } catch (...) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      failure_ = std::current_exception();
+      changed_.notify_all();
+    }
+  }
+  void MakeUntilStopped() {
     for (;;) {
       {
         std::unique_lock<std::mutex> lock(mutex_);
@@ -86,6 +95,7 @@ class MadeAhead {
   std::condition_variable changed_;
   std::deque<T> made_;
   bool stop_ = false;
+  std::exception_ptr failure_;
   Beside maker_;  // last: its thread uses all else, and ends first
 };
 

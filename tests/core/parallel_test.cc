@@ -4,7 +4,11 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <set>
+#include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace camgyro {
@@ -110,6 +114,30 @@ TEST_F(ParallelTest, MadeAheadComesInOrder) {
       EXPECT_LE(made, i + (threads == 1 ? 1 : 5));
     }
   }
+}
+
+// A library that throws in a thread must not end the process.
+TEST_F(ParallelTest, PassesOnWhatIsThrown) {
+  for (const int threads : {1, 2}) {
+    LimitThreads(threads);
+    EXPECT_THROW(ParallelFor(8,
+                             [](size_t i) {
+                               if (i == 5) throw std::runtime_error("five");
+                             }),
+                 std::runtime_error);
+    Beside beside([] { throw std::runtime_error("beside"); });
+    EXPECT_THROW(beside.Wait(), std::runtime_error);
+    int made = 0;
+    MadeAhead<int> numbers(3, [&] {
+      if (made == 2) throw std::runtime_error("two");
+      return made++;
+    });
+    EXPECT_EQ(numbers.Take(), 0);
+    EXPECT_EQ(numbers.Take(), 1);
+    EXPECT_THROW(numbers.Take(), std::runtime_error);
+  }
+  LimitThreads(2);
+  EXPECT_TRUE(Beside([] {}).has_thread());  // none was lost
 }
 
 }  // namespace
