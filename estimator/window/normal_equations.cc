@@ -44,6 +44,31 @@ std::vector<BlockId> BlocksOf(const std::vector<const Factor*>& factors) {
   return {used.begin(), used.end()};
 }
 
+namespace {
+
+// Frames' own times and rates as one, from the last to the first, by the first factor that touches
+// them: both couple a pair with the next one, and if all of the one kind went before the other,
+// every rate would in the end be coupled with every other.
+void OrderAlongTime(const std::vector<const Factor*>& factors, std::vector<BlockId>* ids) {
+  const auto is_timed = [](const BlockId& id) {
+    return id.kind == BlockKind::kFrameTime || id.kind == BlockKind::kRates;
+  };
+  std::map<BlockId, size_t> first;
+  for (size_t f = 0; f < factors.size(); ++f) {
+    for (const BlockId& id : factors[f]->blocks) {
+      if (is_timed(id)) first.emplace(id, f);
+    }
+  }
+  // The two kinds are neighbours.
+  const auto begin = std::find_if(ids->begin(), ids->end(), is_timed);
+  const auto end = std::find_if_not(begin, ids->end(), is_timed);
+  if (begin == end || begin->kind != BlockKind::kFrameTime) return;  // rates are in order
+  std::stable_sort(begin, end,
+                   [&](const BlockId& a, const BlockId& b) { return first.at(a) > first.at(b); });
+}
+
+}  // namespace
+
 Unknowns::Unknowns(const std::map<BlockId, Block>& blocks,
                    const std::vector<const Factor*>& factors) {
   ids = BlocksOf(factors);
@@ -51,6 +76,7 @@ Unknowns::Unknowns(const std::map<BlockId, Block>& blocks,
   ids.erase(std::remove_if(ids.begin(), ids.end(),
                            [&](const BlockId& id) { return blocks.at(id).tangent_size() == 0; }),
             ids.end());
+  OrderAlongTime(factors, &ids);
   for (const BlockId& id : ids) {
     numbers[id] = static_cast<int>(sizes.size());
     sizes.push_back(blocks.at(id).tangent_size());

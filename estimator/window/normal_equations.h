@@ -28,8 +28,8 @@ struct FactorValue {
 // The blocks that some factors touch, sorted.
 std::vector<BlockId> BlocksOf(const std::vector<const Factor*>& factors);
 
-// The unknowns of some factors in the order of elimination: bends, directions, rates from the last
-// to the first, and what all share.
+// The unknowns of some factors in the order of elimination: bends, directions, frames' own times
+// and rates from the last to the first, and what all share.
 struct Unknowns {
   Unknowns(const std::map<BlockId, Block>& blocks, const std::vector<const Factor*>& factors);
 
