@@ -99,8 +99,8 @@ def with_lens(recording, folder):
 
 
 def pair(text, key):
-    """value and sigma of `key: {value: .., sigma..: ..}` in calibration.yaml, as lists."""
-    match = re.search(r"%s: \{value: (\[[^]]*\]|[^,]*), sigma\w*: (\[[^]]*\]|[^}]*)\}" % key, text)
+    """value and sigma of `key: {value: .., sigma..: .., ..}` in calibration.yaml, as lists."""
+    match = re.search(r"%s: \{value: (\[[^]]*\]|[^,]*), sigma\w*: (\[[^]]*\]|[^,}]*)" % key, text)
     return [[float(x.replace(".nan", "nan")) for x in group.strip("[]").split(",")]
             for group in match.groups()]
 
