@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
+#include <vector>
 
+#include "core/parallel.h"
 #include "estimator/diagnosis/gain_rule.h"
 #include "estimator/diagnosis/thresholds.h"
 
@@ -32,21 +35,15 @@ class Contest {
   }
 
   std::optional<ContestResult> Run() {
-    for (size_t i = 0; i < all_.size(); ++i) {
-      CandidateResult& r = all_[i].result;
-      const bool in_any_case = TriedInAnyCase(*all_[i].candidate.entry);
-      if (in_any_case && !r.rejected.empty()) {
-        r.tried_anyway = true;
-        r.rejected.clear();
-      }
-      if (!r.rejected.empty()) continue;
-      if (all_[i].candidate.widens_prior()) {
-        RefitWidened(i);
-      } else if (!in_any_case && (static_cast<int>(rivals_.size()) >= fits_.options().max_rivals ||
-                                  r.gain.sum < kLeastGainOfRival * best_gain_)) {
-        r.rejected = "others gain more";
-      } else {
-        RefitRival(i);
+    for (size_t next = 0; next < all_.size();) {
+      const std::vector<size_t> together = NextTogether(&next);
+      std::vector<std::optional<Rival>> refitted(together.size());
+      ParallelFor(together.size(), [&](size_t k) {
+        const size_t i = together[k];
+        refitted[k] = all_[i].candidate.widens_prior() ? RefitWidened(i) : RefitRival(i);
+      });
+      for (std::optional<Rival>& rival : refitted) {
+        if (rival) rivals_.push_back(std::move(*rival));
       }
     }
     if (rivals_.empty()) return std::nullopt;
@@ -58,6 +55,34 @@ class Contest {
   }
 
  private:
+  // Contestants from *next on that are refitted whatever comes of those before them here: with
+  // each, there is at most one rival more. *next becomes the first of the others.
+  std::vector<size_t> NextTogether(size_t* next) {
+    std::vector<size_t> together;
+    for (; *next < all_.size(); ++*next) {
+      CandidateResult& r = all_[*next].result;
+      const bool in_any_case = TriedInAnyCase(*all_[*next].candidate.entry);
+      const bool widens = all_[*next].candidate.widens_prior();
+      const auto most = static_cast<size_t>(fits_.options().max_rivals);
+      if (r.rejected.empty() && !in_any_case && !widens && !together.empty() &&
+          rivals_.size() + together.size() >= most) {
+        break;
+      }
+      if (in_any_case && !r.rejected.empty()) {
+        r.tried_anyway = true;
+        r.rejected.clear();
+      }
+      if (!r.rejected.empty()) continue;
+      if (!in_any_case && !widens &&
+          (rivals_.size() >= most || r.gain.sum < kLeastGainOfRival * best_gain_)) {
+        r.rejected = "others gain more";
+        continue;
+      }
+      together.push_back(*next);
+    }
+    return together;
+  }
+
   // Far from where the model belongs, a linear gain says little: then what throws the plain model
   // off most is tried in any case, and from where it all began. So is a step of a delay that moves:
   // where it leaves most matches beyond the loss, their scores scatter, or are nothing.
@@ -67,16 +92,16 @@ class Contest {
 
   // It frees numbers of every pair, whose gain the likelihood ratio has discounted: that one
   // stands, not the fall of chi2.
-  void RefitWidened(size_t i) {
+  std::optional<Rival> RefitWidened(size_t i) {
     auto& [r, candidate] = all_[i];
     Calibration start = now_.calibration;
     AddEffect(candidate, &start);
     const Result<Refined> fit = fits_.Fit(start, noise_);
-    if (!fit) return;
+    if (!fit) return std::nullopt;
     r.rejected = Implausible(fit->calibration, fits_.in().start.lens[kFocal]);
-    if (!r.rejected.empty()) return;
+    if (!r.rejected.empty()) return std::nullopt;
     r.refitted = true;
-    rivals_.push_back({i, *fit, LatentGain(choice_)});
+    return Rival{i, *fit, LatentGain(choice_)};
   }
 
   // The better of a fit from the present one and, where the model is astray, one from the start.
@@ -99,7 +124,7 @@ class Contest {
     return fit;
   }
 
-  void RefitRival(size_t i) {
+  std::optional<Rival> RefitRival(size_t i) {
     auto& [r, candidate] = all_[i];
     Result<Refined> fit = FitWith(r, candidate);
     if (fit && candidate.entry->step_at && fits_.PlaceSteps(noise_, &fit->calibration)) {
@@ -108,7 +133,7 @@ class Contest {
     }
     if (!fit) {
       r.rejected = "the fit with it failed: " + fit.error().message;
-      return;
+      return std::nullopt;
     }
     fit = fits_.Settle(*std::move(fit));
     r.refitted = true;
@@ -121,7 +146,8 @@ class Contest {
                   .segment(item.first, item.effect->size())
                   .cwiseSqrt();
     r.rejected = WhyNot(r, fit->calibration);
-    if (r.rejected.empty()) rivals_.push_back(std::move(rival));
+    if (!r.rejected.empty()) return std::nullopt;
+    return rival;
   }
 
   // Empty: nothing speaks against it.

@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "core/parallel.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
 #include "factors/rotation_manifold.h"
@@ -237,8 +239,11 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
   Scores scores;
   scores.num_model = kStateSize + static_cast<int>(calibration.effect_values.size());
   const Eigen::Index size = kStateSize + all.set->size();
-  for (const PairBlock& block : blocks) {
-    BlockScore sum;
+  std::vector<BlockScore> sums(blocks.size());
+  std::vector<std::vector<PairScore>> pairs(blocks.size());
+  ParallelFor(blocks.size(), [&](size_t b) {
+    const PairBlock& block = blocks[b];
+    BlockScore& sum = sums[b];
     sum.g.setZero(size);
     sum.H.setZero(size, size);
     if (!block.empty()) sum.time_s = 0.5 * (block.front().time_a_s + block.back().time_b_s);
@@ -254,14 +259,20 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
       PairScore score;
       score.frame_b = pair.frame_b;
       score.time_s = pair.time_b_s;
-      score.block = static_cast<int>(scores.blocks.size());
       // The direction takes two; the bend none, since chi2 has the penalty of its prior.
       score.residuals =
           static_cast<int>(system.r.size()) - (residual.facts().has_direction ? 2 : 0);
       ProjectInto(system, scores.num_model, &score, &sum);
+      pairs[b].push_back(std::move(score));
+    }
+  });
+  for (size_t b = 0; b < blocks.size(); ++b) {
+    if (sums[b].pairs == 0) continue;
+    for (PairScore& score : pairs[b]) {
+      score.block = static_cast<int>(scores.blocks.size());
       scores.pairs.push_back(std::move(score));
     }
-    if (sum.pairs > 0) scores.blocks.push_back(std::move(sum));
+    scores.blocks.push_back(std::move(sums[b]));
   }
   return scores;
 }

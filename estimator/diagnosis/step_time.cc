@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 
 #include "core/effects/catalogue.h"
+#include "core/parallel.h"
 #include "core/robust_statistics.h"
 #include "estimator/diagnosis/pair_scores.h"
 #include "estimator/diagnosis/thresholds.h"
@@ -63,12 +65,17 @@ bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
     };
     const double first_s = setup.frames.front().stamp_s + 1e-3,
                  last_s = setup.frames.back().stamp_s;
-    std::vector<PairCosts> costs;
+    std::vector<const TimedPair*> near;
     for (const TimedPair& pair : pairs) {
       if (pair.time_b_s < times_s.front() || pair.time_a_s > times_s.back()) continue;
-      costs.push_back({pair.time_a_s, pair.time_b_s, chi2(pair, last_s),
-                       chi2(pair, 0.5 * (pair.time_a_s + pair.time_b_s)), chi2(pair, first_s)});
+      near.push_back(&pair);
     }
+    std::vector<PairCosts> costs(near.size());
+    ParallelFor(near.size(), [&](size_t i) {
+      const TimedPair& pair = *near[i];
+      costs[i] = {pair.time_a_s, pair.time_b_s, chi2(pair, last_s),
+                  chi2(pair, 0.5 * (pair.time_a_s + pair.time_b_s)), chi2(pair, first_s)};
+    });
     double least = 0.0;
     size_t first = 0, last = 0;  // of the least
     for (size_t i = 0; i < times_s.size(); ++i) {
@@ -126,9 +133,10 @@ std::optional<LargeStep> FindLargeStep(const EstimationInput& input,
                                        const Calibration& calibration, double noise,
                                        const PairGraphOptions& options) {
   const double scan_noise = ScanNoise(blocks, noise);
-  std::vector<BlockCosts> costs;
-  for (const PairBlock& block : blocks) {
-    BlockCosts cost;
+  std::vector<BlockCosts> of_blocks(blocks.size());
+  ParallelFor(blocks.size(), [&](size_t b) {
+    const PairBlock& block = blocks[b];
+    BlockCosts& cost = of_blocks[b];
     const size_t stride = (block.size() + kScanPairs - 1) / kScanPairs;
     for (size_t i = 0; i < block.size(); i += stride) {
       const auto scores_at = [&](double delay_s) {
@@ -145,11 +153,13 @@ std::optional<LargeStep> FindLargeStep(const EstimationInput& input,
         cost.at[k] += (scores.pairs.empty() ? now : scores).pairs.front().chi2;
       }
     }
-    if (cost.residuals == 0) continue;
+    if (cost.residuals == 0) return;
     cost.begin_s = block.front().time_a_s;
     cost.end_s = block.back().time_b_s;
-    costs.push_back(cost);
-  }
+  });
+  std::vector<BlockCosts> costs;
+  std::copy_if(of_blocks.begin(), of_blocks.end(), std::back_inserter(costs),
+               [](const BlockCosts& cost) { return cost.residuals > 0; });
   if (costs.size() < kLeastBlocks) return std::nullopt;
   std::vector<double> misfits;
   for (const BlockCosts& block : costs) misfits.push_back(block.now() / block.residuals);

@@ -75,10 +75,15 @@ class PairGraph {
 
   // PairResidual::Independent of a pair at the present estimate. With `search`, its direction is
   // first searched anew, and stored if it is better. Empty if a ray is missing.
-  std::vector<double> Residuals(int64_t id, bool search);
+  std::vector<double> Residuals(int64_t id, bool search) {
+    return Residuals(id, search, &bearings_);
+  }
+  // Of all pairs, in the order of pair_ids.
+  std::vector<std::vector<double>> AllResiduals(bool search);
   // The same residuals under the pair's own direction, and each under the direction that fits the
   // other half of the matches: see CrossFit.
-  CrossFit CrossFitOf(int64_t id);
+  CrossFit CrossFitOf(int64_t id) { return CrossFitOf(id, &bearings_); }
+  CrossFit CrossFitOfAll();
   // Sets the noise of a pair already in the graph: pixels, or radians of a rotation.
   void SetSigma(int64_t id, double sigma);
   PairGraphOptions* options() { return &options_; }
@@ -116,6 +121,11 @@ class PairGraph {
   };
 
   const PairResidual& residual() const { return *options_.residual; }
+  // Beside each other for different pairs, with bearings of their own to work in.
+  std::vector<double> Residuals(int64_t id, bool search, PairBearings* bearings);
+  CrossFit CrossFitOf(int64_t id, PairBearings* bearings);
+  template <typename Body>
+  void ForAllPairs(const Body& body);
   void AddStatePrior(const Prior& prior);
   void AddEffectsPrior();
   PairEffects EffectsNow() const;

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "core/parallel.h"
 #include "estimator/window/direction_search.h"
 #include "estimator/window/pair_blocks.h"
 #include "estimator/window/pair_graph.h"
@@ -14,11 +15,11 @@
 
 namespace camgyro {
 
-std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
+std::vector<double> PairGraph::Residuals(int64_t id, bool search, PairBearings* bearings) {
   const Pair& pair = pairs_.at(id);
   const PairMeasurement& m = *pair.measurement;
   std::vector<double> residuals =
-      residual().Independent(pair.measurement, ParametersOf(id, pair), &bearings_);
+      residual().Independent(pair.measurement, ParametersOf(id, pair), bearings);
   if (!search || !residual().facts().has_direction || residuals.empty()) return residuals;
   double cost = 0.0;
   for (const double r : residuals) {
@@ -26,8 +27,8 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
     cost += robust * robust;
   }
   DirectionEstimate found =
-      FindDirection(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold);
-  cost += CostOfPointsBehind(bearings_, m.variance_a(), m.variance_b(), m.robust_threshold,
+      FindDirection(*bearings, m.variance_a(), m.variance_b(), m.robust_threshold);
+  cost += CostOfPointsBehind(*bearings, m.variance_a(), m.variance_b(), m.robust_threshold,
                              graph_.value(DirectionBlock(id)));
   if (!(found.cost < cost)) return residuals;
   graph_.value(DirectionBlock(id)) = found.tau;
@@ -35,15 +36,16 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search) {
   return std::move(found.residuals);
 }
 
-CrossFit PairGraph::CrossFitOf(int64_t id) {
+CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
   CrossFit fit;
   if (!residual().facts().has_direction) return fit;
-  const std::vector<double> own = Residuals(id, /*search=*/false);  // fills the bearings, too
+  const std::vector<double> own =
+      Residuals(id, /*search=*/false, bearings);  // fills the bearings, too
   if (own.size() < 2 * kMinMatches) return fit;
   const Pair& pair = pairs_.at(id);
   PairView view;
   view.measurement = *pair.measurement;
-  view.bearings = bearings_;
+  view.bearings = *bearings;
   view.bend_sigma_rad = pair.bend_sigma_rad;
   const auto bounded_sq = [&](double r) {
     return std::pow(Robustify(r, options_.robust_threshold).value, 2);
@@ -61,6 +63,36 @@ CrossFit PairGraph::CrossFitOf(int64_t id) {
     }
   }
   return fit;
+}
+
+// body(index of the pair, its id, bearings to work in), for some pairs beside others.
+template <typename Body>
+void PairGraph::ForAllPairs(const Body& body) {
+  constexpr size_t kTogether = 16;  // with the same bearings, which are large to allocate
+  const std::vector<int64_t> ids = pair_ids();
+  ParallelFor((ids.size() + kTogether - 1) / kTogether, [&](size_t part) {
+    PairBearings bearings;
+    const size_t end = std::min(ids.size(), (part + 1) * kTogether);
+    for (size_t i = part * kTogether; i < end; ++i) body(i, ids[i], &bearings);
+  });
+}
+
+std::vector<std::vector<double>> PairGraph::AllResiduals(bool search) {
+  std::vector<std::vector<double>> residuals(pairs_.size());
+  ForAllPairs([&](size_t i, int64_t id, PairBearings* bearings) {
+    residuals[i] = Residuals(id, search, bearings);
+  });
+  return residuals;
+}
+
+CrossFit PairGraph::CrossFitOfAll() {
+  std::vector<CrossFit> of_pairs(pairs_.size());
+  ForAllPairs([&](size_t i, int64_t id, PairBearings* bearings) {
+    of_pairs[i] = CrossFitOf(id, bearings);
+  });
+  CrossFit sum;
+  for (const CrossFit& of_pair : of_pairs) sum += of_pair;
+  return sum;
 }
 
 Calibration PairGraph::Estimate() const {

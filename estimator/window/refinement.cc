@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 
+#include "core/parallel.h"
 #include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
 #include "factors/robust.h"
@@ -196,16 +198,13 @@ class Refinement {
   }
 
   std::vector<std::vector<double>> AllResiduals(bool search) {
-    std::vector<std::vector<double>> residuals;
-    for (const int64_t id : ids_) residuals.push_back(graph_->Residuals(id, search));
-    return residuals;
+    return graph_->AllResiduals(search);
   }
 
   // Covariance, quality, and whether the last round has moved the estimate.
   Status Judge(const Calibration& before, const std::vector<std::vector<double>>& residuals) {
     const StateVector moved = Difference(result_.calibration, before);
-    CrossFit cross_fit;
-    for (const int64_t id : ids_) cross_fit += graph_->CrossFitOf(id);
+    const CrossFit cross_fit = graph_->CrossFitOfAll();
     if (const Status known = graph_->EstimateCovariance(options_.cluster_s, cross_fit.inflation(),
                                                         &result_.calibration);
         !known) {
@@ -271,14 +270,18 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
                          const PairGraphOptions& options) {
   UnseenFit fit;
   FitSum sum(options, options.residual->facts().per_match);
-  std::vector<double> residuals;
-  for (const TimedPair& pair : pairs) {
-    if (!ResidualOf(pair, options)
-             .Unseen(input, pair, calibration, noise_px, options, &residuals)) {
-      continue;
+  std::vector<std::optional<std::vector<double>>> of_pairs(pairs.size());
+  ParallelFor(pairs.size(), [&](size_t i) {
+    std::vector<double> residuals;
+    if (ResidualOf(pairs[i], options)
+            .Unseen(input, pairs[i], calibration, noise_px, options, &residuals)) {
+      of_pairs[i] = std::move(residuals);
     }
+  });
+  for (const auto& residuals : of_pairs) {
+    if (!residuals) continue;
     ++fit.pairs;
-    sum.Add(residuals);
+    sum.Add(*residuals);
   }
   fit.matches = sum.matches();
   fit.rms_px = noise_px * sum.rms();

@@ -76,7 +76,7 @@ void SlidingWindow::Process(const Pending& pair) {
   if (!settled_ && num_used_ % options_.unsettled_stride != 0) return;
   if (!settled_) {
     // The estimate still moves: the directions with it.
-    for (const int64_t id : graph_.pair_ids()) graph_.Residuals(id, /*search=*/true);
+    graph_.AllResiduals(/*search=*/true);
     UpdateNoise();
   }
   Calibration estimate;

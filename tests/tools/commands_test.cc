@@ -194,7 +194,7 @@ TEST_F(CommandsTest, DiagnoseWritesItsAccount) {
   std::string longer = kHandheldScenario;
   longer.replace(longer.find("duration_s: 4"), 13, "duration_s: 9");
   Simulate(longer + "effects: {radial_distortion: {k1: -0.2, k2: 0.05}}\n", "a");
-  const RunResult run = Run("diagnose a --out=result");
+  const RunResult run = Run("diagnose a --out=result --threads=3");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("1. radial_distortion"), HasSubstr("unseen frames: rms"),
                              HasSubstr("what to do:"), HasSubstr("verdict    radial_distortion")));
@@ -215,6 +215,14 @@ TEST_F(CommandsTest, DiagnoseWritesItsAccount) {
               AllOf(HasSubstr("Found: radial_distortion"), HasSubstr("map-image"),
                     HasSubstr("rate error over time")));
   EXPECT_THAT(ReadFile(Path("result/residual_maps.csv")), HasSubstr("shift over the image"));
+
+  // In one thread: the same bytes.
+  ASSERT_EQ(Run("diagnose a --out=again --threads=1").exit_code, 0);
+  for (const char* name : {"diagnosis.yaml", "calibration.yaml", "residual_maps.csv"}) {
+    EXPECT_EQ(ReadFile(Path(std::string("again/") + name)),
+              ReadFile(Path(std::string("result/") + name)))
+        << name;
+  }
 }
 
 // Measured: attitudes with errors of their own kind. gyro_axis_delay has p = 7e-8 (D05),
