@@ -76,9 +76,12 @@ class AxialLens final : public Lens {
     const double f = lens[kFocal], aspect = lens[kAspect];
     const double fx = f * aspect;
     const Eigen::Vector2d distorted((px.x() - lens[kCx]) / fx, (px.y() - lens[kCy]) / f);
+    const bool has_distortion = equidistant_ || !lens.tail<kLensSize - kK1>().isZero(0.0);
+    if (!has_distortion && by_lens != LensDerivatives::kAll) {
+      return UnprojectPinhole(distorted, fx, f, by_lens, out);
+    }
     Eigen::Vector2d xy = distorted;
     Distortion d = Distort(xy, lens);
-    const bool has_distortion = equidistant_ || !lens.tail<kLensSize - kK1>().isZero(0.0);
     if (has_distortion) {
       for (int i = 0; i < 20; ++i) {
         const Eigen::Vector2d error = distorted - d.value;
@@ -111,6 +114,25 @@ class AxialLens final : public Lens {
   }
 
  private:
+  // Without distortion, and without derivatives by it: what the rest of this class computes then,
+  // at a fifth of its time.
+  static bool UnprojectPinhole(const Eigen::Vector2d& xy, double fx, double fy,
+                               LensDerivatives by_lens, RayJet* out) {
+    if (!xy.allFinite()) return false;
+    out->ray << xy, 1.0;
+    out->J_ray_px << 1.0 / fx, 0.0, 0.0, 1.0 / fy, 0.0, 0.0;
+    out->num_lens = by_lens == LensDerivatives::kNone ? 0 : kAspect;
+    if (out->num_lens == 0) return true;
+    out->J_ray_lens.leftCols<kAspect>().setZero();
+    out->J_ray_lens.col(kFocal).head<2>() = -xy / fy;
+    out->J_ray_lens(0, kCx) = -1.0 / fx;
+    out->J_ray_lens(1, kCy) = -1.0 / fy;
+    for (int k = 0; k < kAspect; ++k) out->J_ray_px_lens[k].setZero();
+    out->J_ray_px_lens[kFocal](0, 0) = -(1.0 / fx) / fy;
+    out->J_ray_px_lens[kFocal](1, 1) = -(1.0 / fy) / fy;
+    return true;
+  }
+
   // Derivatives of the ray of a pixel and of its J_ray_px by the first out->num_lens parameters.
   // xy: undistorted, `distorted`: normalised coordinates; d: of the distortion at xy.
   static void DifferentiateByLens(const Eigen::Vector2d& xy, const Eigen::Vector2d& distorted,

@@ -360,7 +360,8 @@ std::optional<CameraRotation> EstimateCameraRotation(const FramePair& pair, cons
   for (const Match& match : pair.matches) {
     RayJet a, b;
     if (match.px_a.allFinite() && match.px_b.allFinite() &&
-        lens_model.Unproject(match.px_a, lens, &a) && lens_model.Unproject(match.px_b, lens, &b)) {
+        lens_model.Unproject(match.px_a, lens, &a, LensDerivatives::kNone) &&
+        lens_model.Unproject(match.px_b, lens, &b, LensDerivatives::kNone)) {
       matches.push_back({a.ray, b.ray, a.J_ray_px, b.J_ray_px});
     }
   }

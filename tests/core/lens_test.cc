@@ -94,6 +94,29 @@ TEST(Lens, DerivativesMatchDifferences) {
   ExpectDerivativesOfDifferences(GetLens(DistortionModel::kKannalaBrandt), FisheyeLens());
 }
 
+// Without distortion, less is computed where fewer derivatives are asked for.
+TEST(Lens, FewerDerivativesAreTheSameOnes) {
+  const LensParameters pinhole = MakePinhole(500.0, {320.0, 240.0}, 1.1);
+  for (const LensParameters& lens : {pinhole, EurocLens()}) {
+    const Lens& model = GetLens(DistortionModel::kRadTan);
+    const Eigen::Vector2d px(401.0, 77.0);
+    RayJet all, some, none;
+    ASSERT_TRUE(model.Unproject(px, lens, &all));
+    ASSERT_TRUE(model.Unproject(px, lens, &some, LensDerivatives::kPinhole));
+    ASSERT_TRUE(model.Unproject(px, lens, &none, LensDerivatives::kNone));
+    EXPECT_EQ(none.num_lens, 0);
+    ASSERT_EQ(some.num_lens, 3);
+    EXPECT_EQ(some.ray, all.ray);
+    EXPECT_EQ(none.ray, all.ray);
+    EXPECT_EQ(some.J_ray_px, all.J_ray_px);
+    EXPECT_EQ(none.J_ray_px, all.J_ray_px);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_EQ(some.J_ray_lens.col(k), all.J_ray_lens.col(k)) << k;
+      EXPECT_EQ(some.J_ray_px_lens[k], all.J_ray_px_lens[k]) << k;
+    }
+  }
+}
+
 TEST(Lens, RefusesPixelsBeyondTheFoldOfTheDistortion) {
   LensParameters lens = MakePinhole(300.0, {320.0, 240.0});
   lens[kK1] = -0.4;  // r (1 - 0.4 r^2) has its maximum 0.61 at r = 0.91
