@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 """Runs `camgyro diagnose` on every measured recording; writes docs/lab/closed_loop.md with plots.
 
-    tools/closed_loop.py [path of camgyro]        (default: build/release/tools/camgyro)
+    tools/closed_loop.py [path of camgyro] [recording...]
 
-The recordings lie in $CAMGYRO_DATA (default: ../shared/data beside the source). docs/lab/
+Default: build/release/tools/camgyro, all recordings; of recordings that are not named the document
+keeps its rows. They lie in $CAMGYRO_DATA (default: ../shared/data beside the source). docs/lab/
 closed_loop_notes.md, the stories, is put in front of the tables word by word.
 """
 import csv
@@ -86,6 +87,30 @@ def row(result):
     return [result["name"], str(result["exit"]), ", ".join(verdict["effects"]) or "none",
             before_after(rounds, "unseen_rms_px", scale), before_after(rounds, "unseen_chi2"),
             gains, "; ".join(said) or "nothing left"]
+
+
+def kept_rows(text, head, names):
+    """Rows of a table of the document as it is, by recording, without those of `names`."""
+    kept = {}
+    lines = iter(text.splitlines())
+    for line in lines:
+        if line == "| " + " | ".join(head) + " |":
+            next(lines)
+            for line in lines:
+                if not line.startswith("| "):
+                    return kept
+                name = line[2:].split(" | ")[0]
+                if name not in names:
+                    kept.setdefault(name, []).append(line[2:-2].split(" | "))
+    return kept
+
+
+def merged(text, head, results, rows_of):
+    """The rows of these results and those that the document has of other recordings."""
+    rows = kept_rows(text, head, [r["name"] for r in results])
+    for result in results:
+        rows[result["name"]] = rows_of(result)
+    return table(head, [row for name in NAMES for row in rows.get(name, [])])
 
 
 def table(head, rows):
@@ -233,9 +258,62 @@ def plot_lens(results, file):
     return "Against Basalt's double sphere calibration of euroc's camera: %s.\n" % "; ".join(said)
 
 
+def level_of(times_s, half=10):
+    """Of each time: the median of its neighbours', moved by the usual interval."""
+    usual = np.median(np.diff(times_s))
+    number = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(np.diff(times_s) / usual)))])
+    left = times_s - usual * number
+    near = [slice(max(0, i - half), i + half + 1) for i in range(len(left))]
+    return usual * number + np.array([np.median(left[n]) for n in near])
+
+
+def plot_frame_times(results, name, file):
+    """The times that frames have of their own, and how they move. Returns a sentence."""
+    result = next((r for r in results if r["name"] == name), None)
+    path = os.path.join(result["out"], "frame_times.csv") if result else ""
+    if not os.path.exists(path):
+        return ""
+    data = np.genfromtxt(path, delimiter=",", dtype=np.int64, comments="#")
+    origin = data[0, 0]
+    stamp_s, own_s = 1e-9 * (data[:, 0] - origin), 1e-9 * (data[:, 1] - origin)
+    level_s = level_of(stamp_s)
+    late_ms, own_ms = 1e3 * (stamp_s - level_s), 1e3 * (own_s - level_s)
+    known = 1e-6 * data[:, 2] < 0.5  # ms
+    # Each of the frames that are known, by the median of eleven around it.
+    slow_ms = np.array([np.median(own_ms[known][max(0, i - 5):i + 6]) for i in range(known.sum())])
+    figure, axes = plt.subplots(2, 2, figsize=(9, 4.5), layout="constrained", sharex="col",
+                                sharey="row", width_ratios=[4, 1])
+    for (axis, counts), value, where, colour, label in (
+            (axes[0], late_ms, late_ms == late_ms, BEFORE, "stamp, less the\nstamps' level [ms]"),
+            (axes[1], own_ms, known, AFTER, "frame's own time, less\nthe stamps' level [ms]")):
+        axis.plot(stamp_s[where], value[where], ".", color=colour, markersize=2)
+        axis.set_ylabel(label)
+        axis.set_ylim(-15, 15)
+        axis.grid(color="0.9")
+        counts.hist(slow_ms if where is known else value[where], np.arange(-15, 15.1, 0.5),
+                    orientation="horizontal", color=colour)
+    axes[1][0].set_xlabel("time [s]")
+    axes[1][1].set_xlabel("frames")
+    figure.suptitle(name + ": when frames were stamped, and when they were taken")
+    figure.savefig(os.path.join(SOURCE, "docs/lab", file), metadata={"Date": None})
+    plt.close(figure)
+    centred = own_ms[known] - own_ms[known].mean()
+    alike = [(centred[lag:] * centred[:-lag]).mean() / centred.var() for lag in (1, 10, 40, 80)]
+    return ("Frames' own times in %s (the %d known to 0.5 ms): standard deviation %.1f ms around "
+            "the stamps' level, of which %.1f ms move slowly (median of 11 frames); autocorrelation "
+            "%.2f, %.2f, %.2f and %.2f over 1, 10, 40 and 80 frames. The stamps themselves: %.1f ms "
+            "around their level (1.48 times the median distance).\n" % (
+                name, known.sum(), centred.std(), slow_ms.std(), *alike,
+                1.4826 * np.median(np.abs(late_ms))))
+
+
 def write(results):
     """The document from what is there so far: a long run that is cut off leaves what it has."""
     results = sorted(results, key=lambda r: NAMES.index(r["name"]))
+    with open(SOURCE + "/docs/lab/closed_loop.md", encoding="utf-8") as old:
+        text = old.read()
+    times = plot_frame_times(results, "phone-edge-hand", "closed_loop_edge_times.svg") or next(
+        (line + "\n" for line in text.splitlines() if line.startswith("Frames' own times")), "")
     for name in ("D12", "D13"):
         plot_over_axis(results, "tablet-attitude/" + name,
                        "rate error over the angular acceleration", ["x", "y", "z"], 1e3,
@@ -245,8 +323,12 @@ def write(results):
                    ("time [s]", "delay left [ms]"), "closed_loop_skew.svg")
     plot_image(results, "ov_handheld_rs", "closed_loop_ov.svg")
     plot_image(results, "euroc-v101-flight", "closed_loop_euroc.svg")
-    lens = plot_lens(results, "closed_loop_lens.svg")
-    missing = [name for name in NAMES if name not in [r["name"] for r in results]]
+    lens = plot_lens(results, "closed_loop_lens.svg") or next(
+        (line + "\n" for line in text.splitlines() if line.startswith("Against Basalt's")), "")
+    head = ["Recording", "Exit", "Effects", "rms", "chi2/dof", "fall of chi2", "Left"]
+    known = kept_rows(text, head, [])
+    missing = [name for name in NAMES
+               if name not in known and name not in [r["name"] for r in results]]
     with open(SOURCE + "/docs/lab/closed_loop.md", "w", encoding="utf-8") as out:
         out.write("# The closed loop on measured data\n\nMade by `tools/closed_loop.py`; the text "
                   "before the tables is `docs/lab/closed_loop_notes.md`.\n\n")
@@ -256,23 +338,21 @@ def write(results):
                   "effect has seen; rms in px (tablet-attitude: mrad), chi2 per residual, both with "
                   "the noise of the fit before each effect; fall of chi2 ± its scatter between "
                   "stretches, one per effect.\n\n")
-        out.write(table(["Recording", "Exit", "Effects", "rms", "chi2/dof", "fall of chi2", "Left"],
-                        [row(r) for r in results]))
+        out.write(merged(text, head, results, lambda r: [row(r)]))
         if missing:
             out.write("\nNot run: " + ", ".join(missing) + ".\n")
         out.write("\n## Size of the effects\n\nFrom the fit on all frames.\n\n")
-        out.write(table(["Recording", "Effect", "Parameter", "Value"],
-                        [p for r in results for p in parameters(r)]))
-        out.write("\n" + lens)
+        out.write(merged(text, ["Recording", "Effect", "Parameter", "Value"], results, parameters))
+        out.write("\n" + lens + "\n" + times)
         out.write("\n## Calibration without and with the effects\n\n")
-        out.write(table(["Recording", "f [px]", "t_r [ms]", "t_d [ms]", "f with", "t_r with",
-                         "t_d with"], [state(r) for r in results if "calibration_before" in r]))
-        out.write("\nSeconds, two recordings at a time: " + ", ".join(
-            "%s %.0f" % (r["name"], r["seconds"]) for r in results) + ".\n")
+        out.write(merged(text, ["Recording", "f [px]", "t_r [ms]", "t_d [ms]", "f with", "t_r with",
+                                "t_d with"], results,
+                         lambda r: [state(r)] if "calibration_before" in r else []))
 
 
 def main():
     camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
+    chosen = sys.argv[2:]
     plt.rcParams.update({"font.size": 9, "svg.hashsalt": "camgyro"})
     folder = tempfile.mkdtemp(prefix="closed_loop_")
     results = []
@@ -281,7 +361,7 @@ def main():
         order = sorted(NAMES, key=lambda name: ("gopro-hero5" in name, name.startswith("ov_"),
                                                 not name.startswith("tablet")))
         for done in as_completed([pool.submit(diagnose, camgyro, name, folder)
-                                  for name in order]):
+                                  for name in order if not chosen or name in chosen]):
             results.append(done.result())
             write(results)
     shutil.rmtree(folder)
