@@ -7,8 +7,8 @@ add_library(camgyro_build_flags INTERFACE)
 target_compile_options(camgyro_build_flags INTERFACE -Wall -Wextra -Wshadow)
 if(CAMGYRO_WERROR)
   # The two exceptions are GCC 12 false alarms inside Eigen 3.4.
-  target_compile_options(camgyro_build_flags INTERFACE -Werror -Wno-error=array-bounds
-                                                       -Wno-error=maybe-uninitialized)
+  target_compile_options(camgyro_build_flags INTERFACE -Werror
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-error=array-bounds -Wno-error=maybe-uninitialized>)
 endif()
 if(CAMGYRO_SANITIZE)
   # Without the checks at each use of a pointer, of which Eigen is full: they were a third of the

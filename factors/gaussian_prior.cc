@@ -30,7 +30,7 @@ bool GaussianPrior::Evaluate(double const* const* parameters, double* residuals,
     const Eigen::VectorXd inv_sigma = block.sigma.cwiseInverse();
     Eigen::VectorXd delta(size);
     if (block.is_rotation) {
-      const Eigen::Quaterniond q(Eigen::Map<const Eigen::Quaterniond>(parameters[k]));
+      const Eigen::Quaterniond q = Eigen::Map<const Eigen::Quaterniond>(parameters[k]);
       const Eigen::Quaterniond q_mean(Eigen::Map<const Eigen::Quaterniond>(block.mean.data()));
       delta = Log(Eigen::Quaterniond(q_mean.conjugate() * q.normalized()));
     } else {

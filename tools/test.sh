@@ -6,7 +6,10 @@ cd "$(dirname "$0")/.."
 preset=${1:-release}
 shift || true
 
-tools/install_deps.sh
+case $preset in
+  asan | tsan) tools/install_deps.sh clang-14 libclang-rt-14-dev ;;
+  *) tools/install_deps.sh ;;
+esac
 cmake --log-level=WARNING --preset "$preset" -DCAMGYRO_WERROR="${CAMGYRO_WERROR:-OFF}"
 cmake --build --preset "$preset" -j "$(nproc)"
 

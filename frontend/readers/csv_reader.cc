@@ -58,7 +58,6 @@ CsvReader::CsvReader(const std::string& file, std::vector<std::string> columns,
 
 CsvReader CsvReader::ByName(const std::string& file, int skip_lines) {
   CsvReader csv(file);
-  std::string_view text;
   while (csv.line_ < skip_lines && csv.position_ < csv.content_.size()) {
     csv.position_ = std::min(csv.content_.find('\n', csv.position_), csv.content_.size()) + 1;
     ++csv.line_;

@@ -59,8 +59,7 @@ class Stabilizer {
  public:
   Stabilizer(const Recording& recording, const Calibration& calibration,
              const StabilizeOptions& options)
-      : recording_(recording),
-        calibration_(calibration),
+      : calibration_(calibration),
         options_(options),
         path_(recording, calibration),
         size_(calibration.width_px & ~1, calibration.height_px & ~1),
@@ -156,7 +155,6 @@ class Stabilizer {
     return both;
   }
 
-  const Recording& recording_;
   const Calibration& calibration_;
   const StabilizeOptions& options_;
   const CameraPath path_;
