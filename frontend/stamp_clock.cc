@@ -240,8 +240,10 @@ void FitClock(const std::vector<int64_t>& number, const std::vector<double>& lat
                                       : QuantileLine(inside, kEarlyBlocks));
   }
   const auto at = [&](double x) {
-    const double place =
-        std::clamp((x - first) / half - 1.0, 0.0, static_cast<double>(lines.size() - 1));
+    const double place =  // half is 0 for a stretch of one sample
+        half > 0.0
+            ? std::clamp((x - first) / half - 1.0, 0.0, static_cast<double>(lines.size() - 1))
+            : 0.0;
     const size_t w = std::min(static_cast<size_t>(place), lines.size() - 1);
     const double fade = place - static_cast<double>(w);
     if (w + 1 == lines.size()) return lines[w].At(x);

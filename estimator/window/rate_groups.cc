@@ -28,9 +28,12 @@ std::vector<double> Intervals(const std::deque<TimedRate>& samples) {
 }  // namespace
 
 int PairGraphOptions::RateStep(double interval_s, double focal_px) const {
+  constexpr double kMost = 1e6;  // an int holds it
+  if (!(interval_s > 0.0)) return 1;
   const double walk_px = gyro_sigma_rad_s.maxCoeff() * interval_s * focal_px;  // of a sample
   const double samples = 12.0 * rate_step_px * rate_step_px / (walk_px * walk_px);
-  return std::max(1, static_cast<int>(std::min(samples, std::round(rate_step_s / interval_s))));
+  return static_cast<int>(
+      std::clamp(std::min(samples, std::round(rate_step_s / interval_s)), 1.0, kMost));
 }
 
 RateGroups::RateGroups(const PairGraphOptions& options, const Prior& prior,

@@ -50,8 +50,10 @@ inline PairScene MakePairScene(
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  // One draw after the other: in which order arguments are evaluated is the compiler's choice.
   const auto random_vector = [&] {
-    return Eigen::Vector3d(normal(generator), normal(generator), normal(generator));
+    const double z = normal(generator), y = normal(generator), x = normal(generator);
+    return Eigen::Vector3d(x, y, z);
   };
   PairScene s;
   s.lens = MakePinhole(460.0, {370.0, 245.0}, 1.003);
@@ -97,7 +99,8 @@ inline PairScene MakePairScene(
       chain.At(1.03).R_ref_gyro * s.q_gyro_cam.toRotationMatrix();
   while (static_cast<int>(s.pair->matches.size()) < num_matches) {
     RayJet jet;
-    const Eigen::Vector2d start(40 + 670 * uniform(generator), 30 + 420 * uniform(generator));
+    const double down = uniform(generator), right = uniform(generator);
+    const Eigen::Vector2d start(40 + 670 * right, 30 + 420 * down);
     if (!s.pair->lens->Unproject(start, s.lens, &jet)) continue;
     const double depth = 1.5 + 18.5 * uniform(generator);
     const Eigen::Vector3d point = R_ref_cam_middle * (depth * jet.ray);

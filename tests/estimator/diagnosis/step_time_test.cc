@@ -78,8 +78,9 @@ TEST_F(StepTime, IsInTheMiddleOfFramesThatNoPairHas) {
 TEST_F(StepTime, OfALargeStepIsBetweenTheBlocks) {
   std::vector<PairBlock> blocks(5);
   for (const TimedPair& pair : input_.pairs) {
+    if (pair.time_a_s <= 2.0) continue;
     const auto at = static_cast<size_t>(pair.time_a_s - 2.0);
-    if (pair.time_a_s > 2.0 && at < blocks.size()) blocks[at].push_back(pair);
+    if (at < blocks.size()) blocks[at].push_back(pair);
   }
   const double delay_s = calibration_.delay_s;
   for (const double off_s : {0.0, 0.01}) {
