@@ -18,6 +18,14 @@ std::shared_ptr<const EffectSet> WithParameters(const Calibration& start) {
   return start.effects && start.effects->size() > 0 ? start.effects : nullptr;
 }
 
+// Whether derivatives by effects go through those by all of the lens.
+bool ChangeTheLens(const EffectSet* effects) {
+  if (effects == nullptr) return false;
+  return std::any_of(
+      effects->items().begin(), effects->items().end(),
+      [](const EffectSet::Item& item) { return item.entry->part == ModelPart::kLens; });
+}
+
 }  // namespace
 
 PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGraphOptions& options)
@@ -119,7 +127,7 @@ std::shared_ptr<PairMeasurement> PairGraph::Measure(const TimedPair& pair) const
   m.frame_b = pair.second();
   m.size_px << prior_mean_.width_px, prior_mean_.height_px;
   m.effects = effects_;
-  if (m.effects == nullptr) m.by_lens = LensDerivatives::kPinhole;  // the others are held
+  if (!ChangeTheLens(effects_.get())) m.by_lens = LensDerivatives::kPinhole;  // the others are held
   m.sigma = options_.first_sigma();
   m.noise = options_.match_noise;
   m.robust_threshold = options_.robust_threshold;
