@@ -3,8 +3,61 @@
 # of benchmark_notes.md in front, and benchmark_*.svg beside it. SEEDS: runs per scenario (8); JOBS:
 # processes at a time (all cores). The measured recordings are in $CAMGYRO_DATA (../shared/data).
 # tools/benchmark.sh --residuals [CAMGYRO]: only the section of that name, anew in that file.
+# tools/benchmark.sh --times OLD NEW: prints the times of two programs, run in turns, and their
+# ratios, for the table of docs/lab/performance.md. RUNS: of each (2), of which the least counts;
+# ONLY: a pattern of rows.
 set -euo pipefail
+here=$PWD
 cd "$(dirname "$0")/.."
+
+# times OLD NEW: a row per command, seconds by the clock and of the processor.
+times() {
+  local old new data room runs=${RUNS:-2} name command row run program failed=
+  old=$(cd "$here" && realpath "$1") new=$(cd "$here" && realpath "$2")
+  data=$(realpath -m "${CAMGYRO_DATA:-../shared/data}")
+  work=$(mktemp -d)
+  trap 'rm -rf "$work"' EXIT
+  room=$work/room
+  local rows=(
+    "tools/sample, 9 s of 640 x 480|calibrate tools/sample"
+    "8 s of 1280 x 720|calibrate $room"
+    "8 s of 1280 x 720, only tracked|track $room"
+    "ov_corridor_rs, 90 s of tracks|calibrate $data/ov_corridor_rs --effects=radial_distortion:radtan"
+    "phone-edge-hand, 52 s of 640 x 480|calibrate $data/phone-edge-hand"
+    "8 s of 1280 x 720, diagnosed|diagnose $room"
+  )
+  TIMEFORMAT='%R %U'
+  printf '| Recording | before | after | ratio | processor before | after | ratio |\n'
+  printf '| --- | --- | --- | --- | --- | --- | --- |\n'
+  for row in "${rows[@]}"; do
+    name=${row%%|*} command=${row#*|}
+    # shellcheck disable=SC2053
+    [[ -z ${ONLY:-} || $name == $ONLY ]] || continue
+    if [[ $command == *" $room" && ! -d $room ]]; then
+      "$old" simulate tools/scenarios/video_room.yaml seed=1 duration_s=8 \
+        'camera.resolution=[1280,720]' camera.focal_px=1000 --out "$room" > "$work/log"
+    fi
+    if [[ $command == *"$data"* && ! -d $data ]]; then echo "| $name | SKIPPED | | | | | |"; continue; fi
+    : > "$work/seconds"
+    for ((run = 0; run < runs; ++run)); do
+      for program in "$old" "$new"; do
+        # A recording that determines too little ends with 4.
+        # shellcheck disable=SC2086
+        { time "$program" $command --quiet --out "$work/out" > "$work/log" 2>&1 ||
+          [[ $? == 4 ]] || failed=1; } 2>> "$work/seconds"
+        if [[ $failed ]]; then cat "$work/log" >&2; return 1; fi
+      done
+    done
+    awk -v name="$name" '
+      { side = (NR + 1) % 2
+        if (!(side in wall) || $1 < wall[side]) wall[side] = $1
+        if (!(side in user) || $2 < user[side]) user[side] = $2 }
+      END { printf "| %s | %.1f s | %.1f s | %.2f | %.1f s | %.1f s | %.2f |\n", name, wall[0],
+              wall[1], wall[1] / wall[0], user[0], user[1], user[1] / user[0] }' "$work/seconds"
+  done
+}
+if [[ ${1:-} == --times ]]; then times "$2" "$3"; exit; fi
+
 only=
 if [[ ${1:-} == --residuals ]]; then only=residuals; shift; fi
 camgyro=$(realpath "${1:-build/release/tools/camgyro}")
