@@ -30,6 +30,7 @@ from measure import DATA, RECORDINGS  # noqa: E402
 
 # Recordings as they are; the lens of ov_* and euroc-* is not declared.
 NAMES = [name for name, variant, _ in RECORDINGS if not variant]
+OF_ATTITUDES = ("tablet-attitude", "tango-walk", "arkit-attitude")
 BEFORE, AFTER = "#b35806", "#2166ac"  # told apart by colour-blind people and in grey
 
 
@@ -81,7 +82,7 @@ def row(result):
         said.append("cannot tell apart: " + "; ".join(", ".join(a)
                                                       for a in verdict["indistinguishable"]))
     rounds = d["rounds"]
-    scale = 1e3 if result["name"].startswith("tablet-attitude") else 1.0
+    scale = 1e3 if result["name"].startswith(OF_ATTITUDES) else 1.0
     gains = ", ".join("%.0f ± %.0f" % (r["unseen_gain"]["value"], r["unseen_gain"]["sigma"])
                       for r in rounds if r["added"] != "none")
     return [result["name"], str(result["exit"]), ", ".join(verdict["effects"]) or "none",
@@ -335,7 +336,7 @@ def write(results):
         with open(SOURCE + "/docs/lab/closed_loop_notes.md", encoding="utf-8") as notes:
             out.write(notes.read())
         out.write("\n## Before and after\n\nIn frames that neither the fit nor the choice of the "
-                  "effect has seen; rms in px (tablet-attitude: mrad), chi2 per residual, both with "
+                  "effect has seen; rms in px (of attitudes: mrad), chi2 per residual, both with "
                   "the noise of the fit before each effect; fall of chi2 ± its scatter between "
                   "stretches, one per effect.\n\n")
         out.write(merged(text, head, results, lambda r: [row(r)]))
@@ -359,7 +360,7 @@ def main():
     with ThreadPoolExecutor(2) as pool:
         # The short ones, attitudes, first.
         order = sorted(NAMES, key=lambda name: ("gopro-hero5" in name, name.startswith("ov_"),
-                                                not name.startswith("tablet")))
+                                                not name.startswith(OF_ATTITUDES)))
         for done in as_completed([pool.submit(diagnose, camgyro, name, folder)
                                   for name in order if not chosen or name in chosen]):
             results.append(done.result())
