@@ -2,10 +2,12 @@
 """Runs `camgyro diagnose` on every measured recording; writes docs/lab/closed_loop.md with plots.
 
     tools/closed_loop.py [path of camgyro] [recording...]
+    tools/closed_loop.py --times FOLDER
 
 Default: build/release/tools/camgyro, all recordings; of recordings that are not named the document
 keeps its rows. They lie in $CAMGYRO_DATA (default: ../shared/data beside the source). docs/lab/
-closed_loop_notes.md, the stories, is put in front of the tables word by word.
+closed_loop_notes.md, the stories, is put in front of the tables word by word. --times draws only the
+picture of frames' own times, from what `camgyro calibrate phone-edge-hand --out FOLDER` has written.
 """
 import csv
 import math
@@ -31,6 +33,7 @@ from measure import DATA, RECORDINGS  # noqa: E402
 # Recordings as they are; the lens of ov_* and euroc-* is not declared.
 NAMES = [name for name, variant, _ in RECORDINGS if not variant]
 OF_ATTITUDES = ("tablet-attitude", "tango-walk", "arkit-attitude")
+TIMES_FILE = "closed_loop_edge_times.svg"
 BEFORE, AFTER = "#b35806", "#2166ac"  # told apart by colour-blind people and in grey
 
 
@@ -287,7 +290,8 @@ def plot_frame_times(results, name, file):
     for (axis, counts), value, where, colour, label in (
             (axes[0], late_ms, late_ms == late_ms, BEFORE, "stamp, less the\nstamps' level [ms]"),
             (axes[1], own_ms, known, AFTER, "frame's own time, less\nthe stamps' level [ms]")):
-        axis.plot(stamp_s[where], value[where], ".", color=colour, markersize=2)
+        axis.plot(stamp_s[where], value[where], ".", color=colour, markersize=2,
+                  rasterized=True)
         axis.set_ylabel(label)
         axis.set_ylim(-15, 15)
         axis.grid(color="0.9")
@@ -313,7 +317,7 @@ def write(results):
     results = sorted(results, key=lambda r: NAMES.index(r["name"]))
     with open(SOURCE + "/docs/lab/closed_loop.md", encoding="utf-8") as old:
         text = old.read()
-    times = plot_frame_times(results, "phone-edge-hand", "closed_loop_edge_times.svg") or next(
+    times = plot_frame_times(results, "phone-edge-hand", TIMES_FILE) or next(
         (line + "\n" for line in text.splitlines() if line.startswith("Frames' own times")), "")
     for name in ("D12", "D13"):
         plot_over_axis(results, "tablet-attitude/" + name,
@@ -353,8 +357,12 @@ def write(results):
 
 def main():
     camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
-    chosen = sys.argv[2:]
     plt.rcParams.update({"font.size": 9, "svg.hashsalt": "camgyro"})
+    if camgyro == "--times":
+        print(plot_frame_times([dict(name="phone-edge-hand", out=sys.argv[2])], "phone-edge-hand",
+                               TIMES_FILE))
+        return
+    chosen = sys.argv[2:]
     folder = tempfile.mkdtemp(prefix="closed_loop_")
     results = []
     with ThreadPoolExecutor(2) as pool:
