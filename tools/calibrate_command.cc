@@ -1,9 +1,12 @@
-// `camgyro calibrate RECORDING --out DIR`: the main job.
+// `camgyro calibrate RECORDING... --out DIR`: the main job.
 #include <gflags/gflags.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <utility>
 
+#include "pipeline/device.h"
 #include "pipeline/input_yaml.h"
 #include "pipeline/result_files.h"
 #include "pipeline/run.h"
@@ -53,14 +56,16 @@ Result<CalibrateOptions> OptionsFromFlags() {
   return options;
 }
 
-Status RunCalibrate(const std::vector<std::string>& arguments) {
-  const Result<CalibrateOptions> options = OptionsFromFlags();
-  if (!options) return tl::unexpected(options.error());
-  const Result<DeviceClass> device = DeviceFromFlag();
-  if (!device) return tl::unexpected(device.error());
-  FileSet files(FLAGS_out.empty() ? "calibration" : FLAGS_out);
-  if (Status writable = files.CheckWritable(); !writable) return writable;
-  Result<Recording> recording = OpenRecording(arguments[0]);
+// A recording that was calibrated, with its files written and its result printed.
+struct Calibrated {
+  CalibrationReport report;
+  bool attitudes = false;
+};
+
+Result<Calibrated> CalibrateOne(const std::string& path, const std::string& folder,
+                                const CalibrateOptions& options, DeviceClass device) {
+  FileSet files(folder);
+  Result<Recording> recording = OpenRecording(path);
   if (!recording) return tl::unexpected(recording.error());
   if (!FLAGS_quiet) {
     std::printf("%s: %s\n%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),
@@ -73,12 +78,11 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   {
     ProgressBar bar;
     run = RunCalibration(
-        *options, FLAGS_estimator == "ekf" ? OnlineEstimator::kPaperEkf : OnlineEstimator::kWindow,
-        *device, [&](const std::string& stage, double done) { bar.Show(stage, done); },
-        &*recording);
+        options, FLAGS_estimator == "ekf" ? OnlineEstimator::kPaperEkf : OnlineEstimator::kWindow,
+        device, [&](const std::string& stage, double done) { bar.Show(stage, done); }, &*recording);
   }
   if (!run) return tl::unexpected(run.error());
-  if (Status strict = CheckStrict(*recording); !strict) return strict;
+  if (Status strict = CheckStrict(*recording); !strict) return tl::unexpected(strict.error());
   const CalibrationReport* report = &run->report;
   const TrackingSummary* tracking = &run->tracking;
 
@@ -92,13 +96,12 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
   const std::string yaml = CalibrationYaml(*report, attitudes) + InputYaml(*recording);
   files.Add("calibration.yaml", yaml);
   const Command command = CalibrateCommand();
-  const Result<std::string> html =
-      CalibrationReportHtml(*recording, *report,
-                            {CommandLineOf(command, arguments), DescribeRecording(*recording),
-                             FlagValues(command), yaml});
+  const Result<std::string> html = CalibrationReportHtml(
+      *recording, *report,
+      {CommandLineOf(command, {path}), DescribeRecording(*recording), FlagValues(command), yaml});
   if (!html) return tl::unexpected(html.error());
   files.Add("report.html", *html);
-  if (Status written = files.Write(); !written) return written;
+  if (Status written = files.Write(); !written) return tl::unexpected(written.error());
 
   std::printf("\n%s", ParameterTable(report->calibration, attitudes).c_str());
   if (!FLAGS_quiet) {
@@ -112,7 +115,87 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
     std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv%s\n",
                 files.folder().c_str(), has_frame_times ? ", frame_times.csv" : "");
   }
-  return CheckDetermined(report->calibration);
+  return Calibrated{std::move(run->report), attitudes};
+}
+
+// The last part of each path, with a number where two would be the same.
+std::vector<std::string> FolderNames(const std::vector<std::string>& paths) {
+  std::vector<std::string> names;
+  for (const std::string& path : paths) {
+    std::filesystem::path last = std::filesystem::path(path).lexically_normal();
+    if (!last.has_filename()) last = last.parent_path();
+    std::string name = last.stem().string();
+    if (name.empty() || name == "." || name == "..") name = "recording";
+    const std::string plain = name;
+    for (int n = 2; std::find(names.begin(), names.end(), name) != names.end(); ++n) {
+      name = plain + "_" + std::to_string(n);
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+// Each recording by itself, then what they say of their device together. A recording that cannot be
+// calibrated is named and left out.
+Status CalibrateDevice(const std::vector<std::string>& paths, const std::string& folder,
+                       const CalibrateOptions& options, DeviceClass device_class) {
+  for (const std::string& path : paths) {  // before minutes of work, not after them
+    if (std::filesystem::exists(path)) continue;
+    if (Result<Recording> missing = OpenRecording(path); !missing) {
+      return tl::unexpected(missing.error());
+    }
+  }
+  const std::vector<std::string> names = FolderNames(paths);
+  std::vector<Calibrated> all;
+  std::vector<std::string> calibrated, refused;
+  for (size_t i = 0; i < paths.size(); ++i) {
+    Result<Calibrated> one = CalibrateOne(
+        paths[i], (std::filesystem::path(folder) / names[i]).string(), options, device_class);
+    if (!one && one.error().kind != ErrorKind::kCannotEstimate) {
+      return tl::unexpected(one.error());
+    }
+    if (one) {
+      calibrated.push_back(names[i]);
+      all.push_back(*std::move(one));
+    } else {
+      refused.push_back(names[i] + " is left out: " + one.error().message);
+      std::printf("%s", Notes("refused", {refused.back()}).c_str());
+    }
+    std::printf("\n");
+  }
+  if (all.size() < 2) {
+    return CannotEstimate("fewer than two recordings could be calibrated: " + refused.front());
+  }
+  std::vector<const CalibrationReport*> reports;
+  bool attitudes = true;
+  for (const Calibrated& one : all) {
+    reports.push_back(&one.report);
+    attitudes = attitudes && one.attitudes;
+  }
+  const Result<DeviceReport> device = CombineToDevice(calibrated, reports, attitudes);
+  if (!device) return tl::unexpected(device.error());
+  FileSet files(folder);
+  files.Add("calibration.yaml", DeviceYaml(*device));
+  if (Status written = files.Write(); !written) return written;
+  std::printf("%s", DeviceTable(*device).c_str());
+  if (!FLAGS_quiet) {
+    std::printf("%s%swritten    %s/calibration.yaml\n", SystematicLine(device->report).c_str(),
+                Notes("refused", refused).c_str(), folder.c_str());
+  }
+  return CheckDetermined(device->report.calibration);
+}
+
+Status RunCalibrate(const std::vector<std::string>& arguments) {
+  const Result<CalibrateOptions> options = OptionsFromFlags();
+  if (!options) return tl::unexpected(options.error());
+  const Result<DeviceClass> device = DeviceFromFlag();
+  if (!device) return tl::unexpected(device.error());
+  const std::string folder = FLAGS_out.empty() ? "calibration" : FLAGS_out;
+  if (Status writable = FileSet(folder).CheckWritable(); !writable) return writable;
+  if (arguments.size() > 1) return CalibrateDevice(arguments, folder, *options, *device);
+  const Result<Calibrated> one = CalibrateOne(arguments[0], folder, *options, *device);
+  if (!one) return tl::unexpected(one.error());
+  return CheckDetermined(one->report.calibration);
 }
 
 }  // namespace
@@ -120,10 +203,12 @@ Status RunCalibrate(const std::vector<std::string>& arguments) {
 Command CalibrateCommand() {
   Command command;
   command.name = "calibrate";
-  command.arguments = "RECORDING";
+  command.arguments = "RECORDING...";
   command.summary =
       "focal length, readout time, delay, mounting and gyro bias: with their uncertainty, into "
-      "calibration.yaml (trace.csv: the online estimate over time; delay.csv: the delay search)";
+      "calibration.yaml (trace.csv: the online estimate over time; delay.csv: the delay search); "
+      "several recordings: of one device, each into a folder of its own, and the device's "
+      "calibration";
   command.flags = {"out", "effects"};
   for (const std::string& name : FitFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"device", "estimator", "refine"});

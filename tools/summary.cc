@@ -66,6 +66,37 @@ std::string ParameterTable(const Calibration& c, bool attitudes) {
          DescribePermutation(permutation) + ")\n";
 }
 
+std::string DeviceTable(const DeviceReport& device) {
+  const Calibration& c = device.report.calibration;
+  const Eigen::Quaterniond permutation(MountingPermutation(c));
+  std::string table = Format("one device, %zu recordings (delay and bias: of the next one)\n",
+                             device.recordings.size());
+  table += ParameterTable(c, device.attitudes);
+  table += Format("\n  %-22s %16s %8s   %s\n", "between recordings", "spread", "chance", "values");
+  for (const ParameterRow& row :
+       ParameterRows(c, permutation.toRotationMatrix(), device.attitudes)) {
+    const Repeatability& repeats = device.combined.repeatability[static_cast<size_t>(row.index)];
+    if (repeats.recordings < 2) continue;
+    const int decimals = DecimalsFor(device.each.front().sigma()[row.index] * row.unit_scale);
+    table += Format("  %-22s %9.*f %-6s %8.1g  ", row.name.c_str(), decimals,
+                    row.unit_scale * repeats.between, row.unit.c_str(), repeats.p_value);
+    for (const Calibration& each : device.each) {
+      table += Format(" %.*f", decimals, row.unit_scale * ValuesOf(each, permutation)[row.index]);
+    }
+    table += "\n";
+  }
+  table += "  (spread: beyond noise; chance: that noise alone makes such differences)\n\n";
+  for (const OddRecording& odd : device.combined.odd) {
+    const auto i = static_cast<size_t>(odd.parameter);
+    table +=
+        Notes("odd", {Format("%s: its %s is %.1f sigmas off that of the others",
+                             device.recordings[odd.recording].c_str(),
+                             i < kStateSize ? StateTable()[i].label : device.parameters[i].c_str(),
+                             std::abs(odd.sigmas))});
+  }
+  return table;
+}
+
 std::string SystematicLine(const CalibrationReport& report) {
   const auto total = report.calibration.sigma_total();
   if (!total) return "";

@@ -8,6 +8,7 @@
 #include "core/recording.h"
 #include "estimator/calibrate.h"
 #include "frontend/track_recording.h"
+#include "pipeline/device.h"
 
 namespace camgyro {
 
@@ -16,6 +17,10 @@ std::string ParameterTable(const Calibration& calibration, bool attitudes);
 
 // What the error in all is made of beside noise, by parameter; empty where it is not known.
 std::string SystematicLine(const CalibrationReport& report);
+
+// Several recordings: the device's parameters, how well the recordings repeat each, and which of
+// them are odd.
+std::string DeviceTable(const DeviceReport& device);
 
 // Matches, their motion, outliers.
 std::string MotionLine(const Recording& recording, const TrackingSummary& tracking);

@@ -21,8 +21,8 @@ TEST_F(CommandLineTest, BadUsageIsTwoAndSaysWhat) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"", "no command given"},
       {"calibrat x", "unknown command `calibrat`; did you mean `calibrate`?"},
-      {"calibrate", "expected `camgyro calibrate RECORDING`, got 0 arguments"},
-      {"calibrate a b", "got 2 arguments"},
+      {"calibrate", "expected `camgyro calibrate RECORDING...`, got 0 arguments"},
+      {"diagnose a b", "got 2 arguments"},
       {"calibrate a --residul=plane",
        "unknown flag --residul of `camgyro calibrate`; did you mean "
        "--residual?"},

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/calibration.h"
@@ -41,6 +42,51 @@ void ExpectTheTruth(const YAML::Node& calibration) {
   expect_near(calibration["camera"]["focal_px"], 290.0, 3.0);
   expect_near(calibration["shutter"]["readout_s"], 0.020, 0.001);
   expect_near(calibration["clock"]["delay_s"], 0.015, 0.001);
+}
+
+std::string HandheldWith(const std::string& seed, const std::string& focal_px,
+                         const std::string& delay_s) {
+  return "seed: " + seed +
+         "\nduration_s: 5\ncamera: {resolution: [320, 240], focal_px: " + focal_px +
+         ", rate_hz: 20, delay_s: " + delay_s + "}\ntracks: {count: 50, noise_px: 0.2}\n";
+}
+
+// Three recordings of one device with delays of their own, one of another focus, and one at rest.
+TEST_F(CommandsTest, CalibrateSeveralRecordingsOfOneDevice) {
+  Simulate(HandheldWith("1", "290", "0.015"), "a");
+  Simulate(HandheldWith("2", "290", "0.035"), "b");
+  Simulate(HandheldWith("3", "290", "0.015"), "more/a");
+  Simulate(HandheldWith("4", "330", "0.015"), "zoomed");
+  Simulate(HandheldWith("5", "290", "0.015") +
+               "motion: {rotation_rms_rad_s: [0, 0, 0], speed_m_s: 0, sway_rms_m_s: 0}",
+           "rest");
+  const RunResult run = Run("calibrate a b more/a rest --out=device");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("one device, 3 recordings"), HasSubstr("rest is left out: "),
+                             HasSubstr("between recordings"), testing::Not(HasSubstr("odd "))));
+  EXPECT_TRUE(Exists("device/a/report.html"));
+  EXPECT_TRUE(Exists("device/a_2/calibration.yaml"));
+  EXPECT_FALSE(Exists("device/rest/calibration.yaml"));
+  const YAML::Node device = YAML::LoadFile(Path("device/calibration.yaml"));
+  double least_sigma = 1e9;
+  for (const char* name : {"a", "b", "a_2"}) {
+    const YAML::Node one =
+        YAML::LoadFile(Path(std::string("device/") + name + "/calibration.yaml"));
+    least_sigma = std::min(least_sigma, one["camera"]["focal_px"]["sigma"].as<double>());
+  }
+  const YAML::Node focal = device["camera"]["focal_px"];
+  EXPECT_LT(focal["sigma"].as<double>(), 0.95 * least_sigma);
+  EXPECT_NEAR(focal["value"].as<double>(), 290.0, 5.0 * focal["sigma"].as<double>());
+  EXPECT_GT(focal["sigma_total"].as<double>(), focal["sigma"].as<double>());
+  // Of the next recording: 15, 35 and 15 ms are 11.5 ms apart.
+  EXPECT_NEAR(device["clock"]["delay_s"]["sigma_total"].as<double>(), 0.0115 * std::sqrt(4.0 / 3.0),
+              2e-3);
+
+  const RunResult odd = Run("calibrate a b more/a zoomed --out=device --quiet");
+  ASSERT_EQ(odd.exit_code, 0) << odd.err;
+  EXPECT_THAT(odd.out, HasSubstr("odd        zoomed: its focal length is"));
+  EXPECT_EQ(Run("calibrate rest more/rest --out=none").exit_code, 3);  // there is no more/rest
+  EXPECT_EQ(Run("calibrate a rest --out=none").exit_code, 4);
 }
 
 TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
