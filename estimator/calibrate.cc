@@ -367,10 +367,9 @@ class CalibrationJob {
     report_.calibration.covariance *= halves.chi2;
     report_.calibration.effect_covariance *= halves.chi2;
     report_.doubts.push_back(
-        Format("the two halves of the recording disagree beyond their noise (chi2 per parameter "
-               "%.0f instead of 1): something moves that the model holds constant, or the scene is "
-               "degenerate; all sigmas are multiplied by %.1f",
-               halves.chi2, std::sqrt(halves.chi2)));
+        Format("%s (chi2 per parameter %.0f instead of 1): something moves that the model holds "
+               "constant, or the scene is degenerate; all sigmas are multiplied by %.1f",
+               kHalvesDoubt, halves.chi2, std::sqrt(halves.chi2)));
   }
 
   const Recording& recording_;

@@ -17,6 +17,9 @@ namespace camgyro {
 // chi-square with 11 degrees of freedom is 31.3.
 constexpr double kHalvesLimit = 31.3 / kStateSize;
 
+// How the doubt begins that says so.
+constexpr char kHalvesDoubt[] = "the two halves of the recording disagree beyond their noise";
+
 struct Halves {
   double chi2 = 0.0;  // HalvesChi2, 0 if a half cannot be fitted
   std::optional<UnseenFit> unseen;

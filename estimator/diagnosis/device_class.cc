@@ -2,9 +2,10 @@
 
 namespace camgyro {
 
-// A range "+-x" of a data sheet is taken as three standard deviations. Of the data sheets and
-// published calibrations that are named, only ICG-20660's was looked up for this table; the other
-// figures are from experience with them, and the rows that name none are estimates.
+// A range "+-x" of a data sheet is taken as three standard deviations. Looked up for this table
+// were the data sheets of MPU-6050 (PS-MPU-6000A revision 3.4, table 6.1), ADIS16445 (revision F;
+// the gyro of ADIS16448) and ICG-20660, and Bosch's figure for BMG160. The figures of other devices
+// are from experience with them, and the rows that name none are estimates.
 const std::vector<UsualEffect>& UsualEffects() {
   static const std::vector<UsualEffect> effects = {
       // effect, shape, {phone, action camera, industrial}, source
@@ -15,7 +16,7 @@ const std::vector<UsualEffect>& UsualEffects() {
       {"gyro_misalignment",
        "constant",
        {0.007, 0.007, 0.001},
-       "cross-axis sensitivity in data sheets: MPU-6050 and MPU-9250 +-2 %, ADIS16448 0.05 deg"},
+       "cross-axis sensitivity in data sheets: MPU-6050 and MPU-9250 +-2 %, ADIS16445 0.05 deg"},
       {"radial_distortion",
        "radtan",
        {0.03, 0.05, 0.02},
@@ -53,6 +54,10 @@ const std::vector<UsualEffect>& UsualEffects() {
        "constant",
        {1e-4, 5e-5, 2e-5},
        "the square of an exposure of 10 ms, 7 ms and 4.5 ms"},
+      {"exposure_lowpass",
+       "recorded",
+       {1.0, 1.0, 1.0},
+       "the picture's own averaging over the exposure that the file records"},
       {"gyro_lowpass",
        "first_order",
        {1e-5, 4e-6, 4e-6},
@@ -64,11 +69,11 @@ const std::vector<UsualEffect>& UsualEffects() {
       {"bias_drift",
        "linear",
        {2e-5, 2e-5, 5e-6},
-       "0.015 to 0.05 deg/s per K at some K per minute after switching on"},
+       "BMG160 0.015, MPU-6050 0.16 deg/s per K, at some K per minute after switching on"},
       {"gyro_g_sensitivity",
        "diagonal",
        {2e-4, 2e-4, 3e-5},
-       "linear acceleration effect in data sheets: MPU-6050 0.1 deg/s per g, ADIS16448 0.015"},
+       "linear acceleration effect in data sheets: MPU-6050 0.1 deg/s per g, ADIS16445 0.015"},
   };
   return effects;
 }

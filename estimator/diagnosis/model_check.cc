@@ -13,6 +13,7 @@
 #include "estimator/diagnosis/score_test.h"
 #include "estimator/diagnosis/shares.h"
 #include "estimator/diagnosis/thresholds.h"
+#include "estimator/halves.h"
 #include "estimator/window/estimation_input.h"
 
 namespace camgyro {
@@ -89,39 +90,94 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
   return t;
 }
 
-void AddTotal(const Tested& t, double inflation, CalibrationReport* report) {
-  Calibration& c = report->calibration;
+// What the effects of the class may be, given the residuals: columns of the scores, in units of
+// their usual sizes, and how far they pull the state.
+struct Usual {
   std::vector<int> columns;
-  Eigen::VectorXd prior = t.prior;
-  for (const UsualColumns& u : t.usual) {
-    for (const int column : u.columns) {
-      columns.push_back(column);
-      prior[column] = 1.0 / (u.sigma * u.sigma);
+  Eigen::VectorXd prior, sigma;  // information of all columns; usual sizes of `columns`
+  Eigen::MatrixXd C;             // mean square of the effects, given the residuals
+  Eigen::MatrixXd X;             // state x columns
+};
+
+Eigen::MatrixXd ShiftOfState(const Scores& scores, const Usual& u) {
+  return ProjectModelOut(scores, u.columns, u.prior).shift.topRows<kStateSize>() *
+         u.sigma.asDiagonal();
+}
+
+Usual UsualGiven(const Tested& t, double inflation) {
+  Usual u;
+  u.prior = t.prior;
+  for (const UsualColumns& effect : t.usual) {
+    for (const int column : effect.columns) {
+      u.columns.push_back(column);
+      u.prior[column] = 1.0 / (effect.sigma * effect.sigma);
     }
   }
-  if (columns.empty()) return;
-  const Projection p = ProjectModelOut(t.scores, columns, prior);
-  // In units of each column's prior sigma, where the matrix is well-conditioned.
-  Eigen::VectorXd sigma(p.score.size());
-  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
-    sigma[i] = 1.0 / std::sqrt(prior[columns[static_cast<size_t>(i)]]);
+  if (u.columns.empty()) return u;
+  const Projection p = ProjectModelOut(t.scores, u.columns, u.prior);
+  u.sigma.resize(p.score.size());
+  for (Eigen::Index i = 0; i < u.sigma.size(); ++i) {
+    u.sigma[i] = 1.0 / std::sqrt(u.prior[u.columns[static_cast<size_t>(i)]]);
   }
-  Eigen::MatrixXd information = sigma.asDiagonal() * p.information * sigma.asDiagonal() / inflation;
+  Eigen::MatrixXd information =
+      u.sigma.asDiagonal() * p.information * u.sigma.asDiagonal() / inflation;
   information.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> solver(information);
-  const Eigen::VectorXd c_hat = -solver.solve(sigma.cwiseProduct(p.score) / inflation);
-  const Eigen::MatrixXd C =
-      solver.solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())) +
-      c_hat * c_hat.transpose();
-  const Eigen::MatrixXd X = p.shift.topRows<kStateSize>() * sigma.asDiagonal();
+  const Eigen::VectorXd c_hat = -solver.solve(u.sigma.cwiseProduct(p.score) / inflation);
+  u.C = solver.solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())) +
+        c_hat * c_hat.transpose();
+  u.X = p.shift.topRows<kStateSize>() * u.sigma.asDiagonal();
+  return u;
+}
 
-  c.total_covariance = StateCovariance(c.covariance + X * C * X.transpose());
+// Where the halves of a recording disagree, the covariance was multiplied. What usual effects make
+// of the disagreement is in the total anyway, and is taken out of the noise. Not where the motion
+// left something undetermined: a fit that has run away is not near the point of these derivatives.
+void ExplainHalves(const Tested& t, const Usual& u, CalibrationReport* report) {
+  Calibration& c = report->calibration;
+  const double chi2 = report->halves_chi2;
+  if (!(chi2 > kHalvesLimit)) return;
+  if (std::find(c.determined.begin(), c.determined.end(), false) != c.determined.end()) return;
+  Scores first, second;
+  first.num_model = second.num_model = t.scores.num_model;
+  const auto middle = t.scores.blocks.begin() + static_cast<long>(t.scores.blocks.size() / 2);
+  first.blocks.assign(t.scores.blocks.begin(), middle);
+  second.blocks.assign(middle, t.scores.blocks.end());
+  const Eigen::MatrixXd apart = ShiftOfState(first, u) - ShiftOfState(second, u);
+  // Each half has twice the whole's covariance, and their difference four times.
+  const StateVector scale = c.sigma().cwiseInverse() * std::sqrt(chi2 / 4.0);
+  const StateCovariance noise =
+      scale.asDiagonal() * (4.0 / chi2) * c.covariance * scale.asDiagonal();
+  const StateCovariance by_effects =
+      scale.asDiagonal() * apart * u.C * apart.transpose() * scale.asDiagonal();
+  const double expected = 1.0 + noise.ldlt().solve(by_effects).trace() / kStateSize;
+  const double left = std::max(1.0, chi2 / expected);
+  c.covariance *= left / chi2;
+  c.effect_covariance *= left / chi2;
+  auto& doubts = report->doubts;
+  doubts.erase(std::remove_if(doubts.begin(), doubts.end(),
+                              [](const std::string& d) { return d.rfind(kHalvesDoubt, 0) == 0; }),
+               doubts.end());
+  const std::string found = Format(
+      "%s (chi2 per parameter %.0f instead of 1, where effects of a "
+      "usual device make %.0f",
+      kHalvesDoubt, chi2, expected);
+  if (left > 1.0) {
+    doubts.push_back(found + Format("); all sigmas are multiplied by %.1f", std::sqrt(left)));
+  } else {
+    report->notes.push_back(found + "): see the error in all");
+  }
+}
+
+void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
+  Calibration& c = report->calibration;
+  c.total_covariance = StateCovariance(c.covariance + u.X * u.C * u.X.transpose());
   Eigen::Index at = 0;
-  for (const UsualColumns& u : t.usual) {
-    const auto n = static_cast<Eigen::Index>(u.columns.size());
-    const Eigen::MatrixXd X_u = X.middleCols(at, n);
-    const StateVector variance = (X_u * C.block(at, at, n, n) * X_u.transpose()).diagonal();
-    report->systematic.push_back({u.effect, variance.cwiseMax(0.0).cwiseSqrt()});
+  for (const UsualColumns& effect : t.usual) {
+    const auto n = static_cast<Eigen::Index>(effect.columns.size());
+    const Eigen::MatrixXd X = u.X.middleCols(at, n);
+    const StateVector variance = (X * u.C.block(at, at, n, n) * X.transpose()).diagonal();
+    report->systematic.push_back({effect.effect, variance.cwiseMax(0.0).cwiseSqrt()});
     at += n;
   }
 }
@@ -161,7 +217,11 @@ std::optional<std::string> CheckModel(const Recording& recording, const Calibrat
   }
   const Scatter usual = UsualScatter(alone);
   report->device_class = DeviceClassName(device);
-  AddTotal(t, std::max(1.0, usual.variance), report);
+  const Usual effects = UsualGiven(t, std::max(1.0, usual.variance));
+  if (!effects.columns.empty()) {
+    ExplainHalves(t, effects, report);
+    AddTotal(t, effects, report);
+  }
   return Suspect(t, alone, usual);
 }
 

@@ -23,6 +23,11 @@ namespace camgyro {
 // The last term stands because the values are not corrected by X c_hat: a correction by an effect
 // that may be another one is left to the diagnosis, which tests it on unseen frames.
 //
+// Where the two halves of the recording disagree (kHalvesLimit), the covariance was multiplied by
+// their chi-square. These effects let the halves differ as well: by X1 c - X2 c, which makes
+//   1 + tr((4 covariance)^-1 (X1 - X2) C (X1 - X2)') / kStateSize
+// of it. The covariance is divided by that as far as it was multiplied, since total has it.
+//
 // Nothing is filled for a recording that is too short for the scores (kLeastBlocks stretches), or
 // fitted with the residual of the transfer alone.
 std::optional<std::string> CheckModel(const Recording& recording, const CalibrateOptions& options,

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/effects/catalogue.h"
+#include "estimator/halves.h"
 #include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
@@ -18,6 +19,7 @@ struct Calibrated {
   simulation::Simulated simulated;
   CalibrationReport report;
   std::optional<std::string> doubt;
+  StateCovariance before;  // CheckModel
 };
 
 // From a start that is off the truth, without an online pass.
@@ -25,7 +27,7 @@ Calibrated Check(const std::vector<std::string>& overrides, DeviceClass device) 
   auto scenario = simulation::ParseScenario(
       "duration_s: 14\nmotion: {kind: walking}\ntracks: {count: 70, noise_px: 0.5}", overrides);
   EXPECT_TRUE(scenario) << scenario.error().message;
-  Calibrated c{simulation::SimulateTracks(*scenario, 3).value(), {}, {}};
+  Calibrated c{simulation::SimulateTracks(*scenario, 3).value(), {}, {}, {}};
   CalibrateOptions options;
   options.given_start.emplace();
   options.given_start->delay_middle_row_s = c.simulated.truth.delay_s + 0.012;
@@ -36,6 +38,7 @@ Calibrated Check(const std::vector<std::string>& overrides, DeviceClass device) 
   EXPECT_TRUE(report) << report.error().message;
   if (!report) return c;
   c.report = *std::move(report);
+  c.before = c.report.calibration.covariance;
   c.doubt = CheckModel(c.simulated.recording, options, device, &c.report);
   return c;
 }
@@ -77,6 +80,50 @@ TEST(ModelCheck, TheTotalCoversAScaleThatNobodyDeclared) {
   ASSERT_TRUE(found.sigma_total().has_value());
   const StateVector in_totals = error.cwiseQuotient(*found.sigma_total());
   EXPECT_LT(in_totals.cwiseAbs().maxCoeff(), 3.0) << in_totals.transpose();
+}
+
+bool SaysThatHalvesDisagree(const std::vector<std::string>& words) {
+  return std::any_of(words.begin(), words.end(),
+                     [](const std::string& w) { return w.rfind(kHalvesDoubt, 0) == 0; });
+}
+
+// Two crystals 100 ppm apart let the halves' delays differ by many sigmas: that is in the total,
+// and mostly not in the noise.
+TEST(ModelCheck, WhatUsualEffectsMakeOfTheHalvesIsNotNoise) {
+  const Calibrated c = Check({"effects.clock_skew={ppm: 100}"}, DeviceClass::kPhone);
+  ASSERT_GT(c.report.halves_chi2, kHalvesLimit);
+  const auto words = c.report.doubts.empty() ? c.report.notes : c.report.doubts;
+  EXPECT_TRUE(SaysThatHalvesDisagree(words));
+  EXPECT_THAT(words, testing::Contains(HasSubstr("where effects of a usual device make")));
+  // Divided by what is expected, at most down to what it was.
+  const double factor = c.report.calibration.covariance(0, 0) / c.before(0, 0);
+  EXPECT_LT(factor, 0.7);
+  EXPECT_GE(factor, 1.0 / c.report.halves_chi2);
+  EXPECT_GT((*c.report.calibration.sigma_total())[kStateDelay],
+            1.5 * c.report.calibration.sigma()[kStateDelay]);
+}
+
+// What they do not explain stays in both, with the doubt; and all of it stays where the motion has
+// left something undetermined.
+TEST(ModelCheck, WhatUsualEffectsDoNotExplainOfTheHalvesIsNoise) {
+  const Calibrated clean = Check({}, DeviceClass::kPhone);
+  const Eigen::MatrixXd noise = clean.report.calibration.covariance;
+  CalibrationReport apart = clean.report;
+  apart.halves_chi2 = 1000.0;
+  apart.calibration.covariance *= 1000.0;
+  apart.doubts = {std::string(kHalvesDoubt) + " (by hand)"};
+  apart.systematic.clear();
+  CalibrationReport undetermined = apart;
+  undetermined.calibration.determined[kStateReadout] = false;
+
+  CheckModel(clean.simulated.recording, {}, DeviceClass::kIndustrial, &apart);
+  EXPECT_TRUE(SaysThatHalvesDisagree(apart.doubts));
+  EXPECT_GT(apart.calibration.covariance.trace(), 30.0 * noise.trace());
+  EXPECT_LT(apart.calibration.covariance.trace(), 1000.0 * noise.trace());
+  CheckModel(clean.simulated.recording, {}, DeviceClass::kIndustrial, &undetermined);
+  EXPECT_NEAR(undetermined.calibration.covariance.trace(), 1000.0 * noise.trace(),
+              1e-9 * 1000.0 * noise.trace());
+  EXPECT_THAT(undetermined.doubts, testing::ElementsAre(HasSubstr("by hand")));
 }
 
 // What the residuals show beyond doubt is said, whatever the device is.
