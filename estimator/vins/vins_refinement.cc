@@ -187,7 +187,8 @@ class Problem {
     // matters: f, c [px], t_r, t_d [s], b_g [rad/s], q_c [rad].
     StateVector least;
     least << 1e-2, 1e-2, 1e-2, 1e-6, 1e-6, Vector3d::Constant(1e-6), Vector3d::Constant(1e-6);
-    StateCovariance covariance = window_.calibration.covariance;
+    const Calibration& given = window_.calibration;
+    StateCovariance covariance = given.total_covariance.value_or(given.covariance);
     covariance.diagonal() += least.cwiseAbs2();
     const StateVector scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
     const StateCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
@@ -319,6 +320,7 @@ class Problem {
     expand.bottomRightCorner(6 + kStateSize, 6 + kStateSize).setIdentity();
     start->covariance = expand * joint * expand.transpose();
     start->calibration.covariance = start->covariance.bottomRightCorner<kStateSize, kStateSize>();
+    start->calibration.total_covariance.reset();  // the prior had it
 
     start->landmarks.clear();
     for (const size_t j : used_landmarks_) {

@@ -50,7 +50,8 @@ Status CheckInput(const VinsInput& input) {
   const Calibration& c = input.calibration;
   if (!c.lens.allFinite() || !(c.lens[kFocal] > 0.0) || c.height_px <= 0 ||
       !std::isfinite(c.delay_s) || !std::isfinite(c.readout_s) || !c.bias_gyro_rad_s.allFinite() ||
-      !c.q_gyro_cam.coeffs().allFinite() || !c.covariance.allFinite()) {
+      !c.q_gyro_cam.coeffs().allFinite() || !c.covariance.allFinite() ||
+      (c.total_covariance && !c.total_covariance->allFinite())) {
     return BadInput("the calibration is not finite or has no lens");
   }
   return {};

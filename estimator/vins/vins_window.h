@@ -16,7 +16,8 @@ namespace camgyro {
 
 // What came from the sensors, and the calibration that relates them.
 struct VinsInput {
-  Calibration calibration;               // values; its covariance is the prior of the refinement
+  // Values; its covariance, the total one where it is known, is the prior of the refinement.
+  Calibration calibration;
   std::vector<int64_t> frame_stamps_ns;  // camera clock, increasing
   std::vector<std::vector<TrackedPoint>> tracks;  // one entry per frame, by ascending track id
   std::vector<GyroSample> gyro;                   // covers the frames on the gyro's clock

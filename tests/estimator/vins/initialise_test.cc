@@ -170,6 +170,19 @@ TEST(InitialiseVins, CalibrationMovesWithinItsCovariance) {
   EXPECT_LT(start->calibration.sigma()[kStateDelay], 1e-3);
 }
 
+// A calibration is off by what its total says, not by its noise.
+TEST(InitialiseVins, CalibrationMovesWithinItsTotalCovariance) {
+  Case c = MakeCase(WalkingScenario(2.0));
+  c.input.calibration.delay_s += 0.005;
+  c.input.calibration.covariance(kStateDelay, kStateDelay) = 1e-10;
+  c.input.calibration.total_covariance = c.input.calibration.covariance;
+  (*c.input.calibration.total_covariance)(kStateDelay, kStateDelay) = 1e-4;
+  const auto start = InitialiseVins(c.input, SimulatorsNoise(c.scenario));
+  ASSERT_TRUE(start);
+  EXPECT_LT(std::abs(start->calibration.delay_s - c.simulated.truth.delay_s), 1.5e-3);
+  EXPECT_FALSE(start->calibration.total_covariance.has_value());
+}
+
 VinsVerdict VerdictOf(const VinsInput& input) {
   const auto start = InitialiseVins(input);
   EXPECT_TRUE(start) << start.error().message;
