@@ -10,7 +10,7 @@ namespace camgyro {
 
 // Recording, read_recording.
 void BindRecording(pybind11::module_* module);
-// Calibration, CalibrationReport, calibrate, VinsStart, initialise_vins.
+// Calibration, CalibrationReport, calibrate, DeviceReport, combine, VinsStart, initialise_vins.
 void BindResults(pybind11::module_* module);
 
 // Raises camgyro.Error, whose second argument is the exit code of the command line.

@@ -8,6 +8,7 @@
 
 #include "core/standard_distortion.h"
 #include "estimator/vins/initialise.h"
+#include "pipeline/device.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/result_files.h"
 #include "pipeline/run.h"
@@ -40,6 +41,35 @@ Calibration ReadFile(const std::string& path) {
   Result<Calibration> calibration = ReadCalibration(path);
   if (!calibration) Raise(calibration.error());
   return *std::move(calibration);
+}
+
+DeviceReport CombineReports(
+    const std::vector<std::pair<const Recording*, const CalibrationReport*>>& all) {
+  if (all.empty()) Raise({ErrorKind::kBadUsage, "combine: expected at least one recording"});
+  std::vector<std::string> names;
+  std::vector<const CalibrationReport*> reports;
+  bool attitudes = true;
+  for (const auto& [recording, report] : all) {
+    names.push_back(recording->path);
+    reports.push_back(report);
+    attitudes = attitudes && recording->HasOnlyAttitudes();
+  }
+  Result<DeviceReport> device = CombineToDevice(names, reports, attitudes);
+  if (!device) Raise(device.error());
+  return *std::move(device);
+}
+
+// By parameter: the spread between recordings and its chance.
+std::map<std::string, std::map<std::string, double>> RepeatabilityOf(const DeviceReport& device) {
+  std::map<std::string, std::map<std::string, double>> by_name;
+  for (size_t i = 0; i < device.parameters.size(); ++i) {
+    const Repeatability& r = device.combined.repeatability[i];
+    by_name[device.parameters[i]] = {{"recordings", r.recordings},
+                                     {"between", r.between},
+                                     {"chi2", r.chi2},
+                                     {"p_value", r.p_value}};
+  }
+  return by_name;
 }
 
 // Columns of the online trace by name.
@@ -192,6 +222,32 @@ void BindReport(py::module_* module) {
               "if the data do not determine a calibration.");
 }
 
+void BindDevice(py::module_* module) {
+  py::class_<DeviceReport>(*module, "DeviceReport", "One device from several of its recordings.")
+      .def_property_readonly(
+          "calibration", [](const DeviceReport& d) { return d.report.calibration; },
+          "Calibration; delay and bias: what the next recording is to be expected to have")
+      .def_property_readonly("repeatability", &RepeatabilityOf,
+                             "dict name -> {recordings, between, chi2, p_value}: the spread beyond "
+                             "noise, and the chance that noise alone makes such differences")
+      .def_property_readonly(
+          "odd",
+          [](const DeviceReport& d) {
+            py::list odd;
+            for (const OddRecording& o : d.combined.odd) {
+              odd.append(py::make_tuple(d.recordings[o.recording],
+                                        d.parameters[static_cast<size_t>(o.parameter)], o.sigmas,
+                                        o.p_value));
+            }
+            return odd;
+          },
+          "list of (path, parameter, sigmas, p_value): recordings that the others contradict")
+      .def("yaml", &DeviceYaml, "str: the text of the device's calibration.yaml");
+  module->def("combine", &CombineReports, py::arg("recordings"),
+              "One device from a list of (Recording, CalibrationReport) of its recordings. Raises "
+              "camgyro.Error, code 3, if they cannot be of one camera.");
+}
+
 void BindVins(py::module_* module) {
   py::class_<VinsStart>(*module, "VinsStart",
                         "World: origin and axes of the gyro frame at the first keyframe.")
@@ -259,6 +315,7 @@ void BindVins(py::module_* module) {
 void BindResults(py::module_* module) {
   BindCalibration(module);
   BindReport(module);
+  BindDevice(module);
   BindVins(module);
 }
 

@@ -48,6 +48,20 @@ class CamgyroTest(unittest.TestCase):
     self.assertTrue(((pixels > -1) & (pixels < 720)).all())
     self.assertIn('241 frames', repr(r))
 
+  def test_one_device_from_two_recordings(self):
+    # The same recording twice: no spread, and the information of both.
+    device = camgyro.combine([(self.recording, self.report)] * 2)
+    c = device.calibration
+    self.assertAlmostEqual(c.focal_px, self.report.calibration.focal_px, delta=0.1)
+    np.testing.assert_allclose(c.sigma[:4], self.report.calibration.sigma[:4] / np.sqrt(2),
+                               rtol=0.05)
+    self.assertEqual(device.repeatability['focal_px']['between'], 0.0)
+    self.assertEqual(device.repeatability['delay_s']['recordings'], 2)
+    self.assertEqual(device.odd, [])
+    self.assertIn('recordings:', device.yaml())
+    with self.assertRaises(camgyro.Error):
+      camgyro.combine([])
+
   def test_calibration_is_the_truth_within_its_sigmas(self):
     c = self.report.calibration
     sigma = dict(zip(camgyro.Calibration.names, c.sigma))
