@@ -9,6 +9,7 @@
 #include "core/format.h"
 #include "core/parallel.h"
 #include "estimator/halves.h"
+#include "estimator/informative_pairs.h"
 
 namespace camgyro {
 namespace {
@@ -289,15 +290,15 @@ class CalibrationJob {
   Result<Refined> RefineWith(RefinementOptions options, const Calibration& from,
                              std::optional<double> noise) const {
     options.graph.sigma = noise;
-    return Refine(input_, input_.pairs, from, report_.prior, options);
+    return Refine(input_, refined_pairs_, from, report_.prior, options);
   }
 
   // All pairs, and beside them each half alone.
   Result<Refined> RefineWithHalves(const RefinementOptions& options, const Calibration& from,
                                    const std::function<Result<Refined>()>& all,
                                    Halves* halves) const {
-    if (static_cast<int>(input_.pairs.size()) < kMinPairsForUnseen) return all();
-    HalvesFit fit(input_, from, report_.prior, options);
+    if (static_cast<int>(refined_pairs_.size()) < kMinPairsForUnseen) return all();
+    HalvesFit fit(input_, refined_pairs_, from, report_.prior, options);
     Result<Refined> refined = CannotEstimate("");
     ParallelFor(3, [&](size_t which) {
       if (which == 0) {
@@ -312,6 +313,12 @@ class CalibrationJob {
 
   Status Refinement() {
     Tell("refinement", 0.0);
+    refined_pairs_ = InformativePairs(input_, estimate_.delay_s, options_.most_refined_pairs);
+    if (refined_pairs_.size() < input_.pairs.size()) {
+      report_.notes.push_back(
+          Format("the recording is long: %zu of %zu pairs, those that tell most, are refined",
+                 refined_pairs_.size(), input_.pairs.size()));
+    }
     const RefinementOptions refinement = OptionsOfRefinement();
     Calibration from = estimate_;
     if (from.effects != nullptr &&
@@ -380,6 +387,7 @@ class CalibrationJob {
   CalibrationReport report_;
   StageClock clock_;
   Calibration estimate_, from_start_;
+  std::vector<TimedPair> refined_pairs_;
   PairGraphOptions graph_options_;
 };
 

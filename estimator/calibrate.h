@@ -33,6 +33,9 @@ struct CalibrateOptions {
   FocalScanOptions focal_scan;
   SlidingWindowOptions window;  // its graph is that of the refinement, too
   RefinementOptions refinement;
+  // The refinement takes no more pairs: of longer recordings, the most informative ones
+  // (InformativePairs). Five minutes of neighbours at 30 frames/s.
+  size_t most_refined_pairs = 9000;
 };
 
 struct StageTime {

@@ -22,12 +22,13 @@ double HalvesChi2(const Calibration& first, const Calibration& second) {
 
 }  // namespace
 
-HalvesFit::HalvesFit(const EstimationInput& input, const Calibration& from, const Prior& prior,
+HalvesFit::HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+                     const Calibration& from, const Prior& prior,
                      const RefinementOptions& refinement)
     : input_(input), from_(from), prior_(prior), refinement_(refinement) {
-  const auto middle = input.pairs.begin() + static_cast<std::ptrdiff_t>(input.pairs.size() / 2);
-  halves_[0].assign(input.pairs.begin(), middle);
-  for (auto pair = middle; pair != input.pairs.end(); ++pair) {
+  const auto middle = pairs.begin() + static_cast<std::ptrdiff_t>(pairs.size() / 2);
+  halves_[0].assign(pairs.begin(), middle);
+  for (auto pair = middle; pair != pairs.end(); ++pair) {
     if (pair->time_a_s > halves_[0].back().time_b_s) halves_[1].push_back(*pair);
   }
 }

@@ -30,8 +30,8 @@ struct Halves {
 class HalvesFit {
  public:
   // The arguments have to outlive this.
-  HalvesFit(const EstimationInput& input, const Calibration& from, const Prior& prior,
-            const RefinementOptions& refinement);
+  HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+            const Calibration& from, const Prior& prior, const RefinementOptions& refinement);
   // Fits half 0 or 1: beside the other, if it likes to.
   void Fit(size_t half);
   // Once both are fitted.

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Cholesky>
+
 #include "core/usual_focal.h"
 #include "estimator/starting_point.h"
 #include "estimator/window/residuals/all_residuals.h"
@@ -60,6 +62,37 @@ TEST(CalibrateRecording, FindsTheTruthFromAPoorGuess) {
   EXPECT_LT(report->unseen->rms_px, 1.3 * report->quality.rms_px);
   EXPECT_GT(report->unseen->pairs, 20);
   EXPECT_FALSE(report->trace.empty());
+}
+
+// Bounded to a third of the pairs, it says so; its sigmas are wider, and hold the truth.
+TEST(CalibrateRecording, RefinesTheMostInformativePairsOfALongOne) {
+  double nees = 0.0;
+  constexpr int kSeeds = 4;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    SCOPED_TRACE(seed);
+    Scenario scenario = ShortScenario(12.0);
+    scenario.seed = static_cast<uint64_t>(seed);
+    const Simulated s = SimulateTracks(scenario).value();
+    CalibrateOptions options;
+    const auto all = CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+    ASSERT_TRUE(all.has_value()) << all.error().message;
+    EXPECT_THAT(all->notes, ::testing::IsEmpty());
+    options.most_refined_pairs = static_cast<size_t>(all->quality.pairs / 3);
+    const auto some = CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+    ASSERT_TRUE(some.has_value()) << some.error().message;
+    EXPECT_THAT(some->notes, ::testing::ElementsAre(::testing::HasSubstr("recording is long")));
+    EXPECT_LE(some->quality.pairs, all->quality.pairs / 3);
+    EXPECT_GE(some->quality.pairs, all->quality.pairs / 5);
+    const StateVector wider = some->calibration.sigma().cwiseQuotient(all->calibration.sigma());
+    EXPECT_GT(wider.mean(), 1.0) << wider.transpose();
+    // Three sigmas to one are those of a ninth of the pairs, chosen at random.
+    EXPECT_LT(wider.maxCoeff(), 3.0) << wider.transpose();
+    const StateVector error = Difference(some->calibration, s.truth);
+    nees += error.dot(some->calibration.covariance.ldlt().solve(error)) / kStateSize / kSeeds;
+  }
+  // Of 44 numbers: 1 +- 0.21.
+  EXPECT_LT(nees, 1.8);
+  EXPECT_GT(nees, 0.3);
 }
 
 // A lens that moves follows the rates at the time of exposure. With the effect as the delay of the
