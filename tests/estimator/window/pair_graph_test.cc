@@ -11,6 +11,7 @@
 namespace camgyro {
 namespace {
 
+using simulation::Scenario;
 using simulation::Simulated;
 using simulation::SimulateTracks;
 
@@ -157,6 +158,79 @@ TEST(PairGraph, APixelWithoutRayIsAnError) {
   const Status none = empty.EstimateCovariance(2.0, 1.0, &estimate);
   ASSERT_FALSE(none.has_value());
   EXPECT_THAT(none.error().message, ::testing::HasSubstr("no pair of frames"));
+}
+
+// What has no transfer is left out when a pair is added: one wrong match of a fast turn, by 80 deg
+// here, must not stop the whole fit.
+TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
+  Prior start;
+  start.mean.width_px = 640;
+  start.mean.height_px = 480;
+  start.mean.lens = MakePinhole(500.0, {319.5, 239.5});
+  start.sigma.setOnes();
+  PairGraphOptions options;
+  options.residual = &ByTransfer();
+  const auto residuals_of = [&](int wrong) {
+    PairGraph graph(start.mean, start, options);
+    for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {42.0, 0.0, 0.0}});
+    std::vector<Match> matches;
+    for (int i = 0; i < 10; ++i) matches.push_back({{60.0 * i, 239.5}, {60.0 * i, 239.5}});
+    // The camera turns up: what was 25 deg below its axis is 105 deg below it.
+    for (int i = 0; i < wrong; ++i) {
+      matches[static_cast<size_t>(i)].px_a.y() = 475.0;
+      matches[static_cast<size_t>(i)].px_b.y() = 5.0;
+    }
+    TimedPair pair;
+    pair.time_a_s = 0.2;
+    pair.time_b_s = 0.2 + 1.0 / 30.0;
+    pair.matches = matches;
+    const AddPairResult added = graph.AddPair(pair);
+    if (added != AddPairResult::kAdded) return -1;
+    return static_cast<int>(graph.Residuals(0, false).size());
+  };
+  EXPECT_EQ(residuals_of(0), 20);
+  EXPECT_EQ(residuals_of(2), 16);
+  EXPECT_EQ(residuals_of(3), -1);  // fewer than 8 left
+}
+
+TEST(PairGraph, NoisyGyrosHaveShorterRateSteps) {
+  PairGraphOptions options;
+  options.gyro_sigma_rad_s.setConstant(0.003);  // of a phone, at 200 Hz
+  EXPECT_EQ(options.RateStep(0.005, 650.0), 5);
+  EXPECT_EQ(options.RateStep(0.05, 650.0), 1);
+  options.gyro_sigma_rad_s.setConstant(0.03);  // 0.1 px per sample
+  EXPECT_EQ(options.RateStep(0.005, 650.0), 3);
+  options.gyro_sigma_rad_s.setConstant(0.3);
+  EXPECT_EQ(options.RateStep(0.005, 650.0), 1);
+}
+
+// Directions that the parallax determines take the degrees of freedom that are counted; the best of
+// many that all say nothing takes more, which widens the sigmas.
+TEST(PairGraph, DirectionsWithoutParallaxWidenTheSigmas) {
+  const auto inflation_of = [](Scenario scenario) {
+    scenario.tracks.count = 100;
+    const Simulated s = SimulateTracks(scenario).value();
+    const EstimationInput input = MakeEstimationInput(s.recording);
+    const Prior prior{s.truth, StateVector::Ones()};
+    PairGraphOptions options;
+    options.sigma = 0.7;
+    PairGraph graph(prior.mean, prior, options);
+    for (const TimedRate& rate : input.rates) graph.AddRate(rate);
+    CrossFit sum;
+    for (const TimedPair& pair : input.pairs) {
+      if (graph.AddPair(pair) != AddPairResult::kAdded) continue;
+      graph.Residuals(pair.id, /*search=*/true);
+      sum += graph.CrossFitOf(pair.id);
+    }
+    // Two to six of some 50 in a half.
+    EXPECT_GT(sum.expected / sum.own, 1.035);
+    EXPECT_LT(sum.expected / sum.own, 1.13);
+    return sum.inflation();
+  };
+  Scenario near = ShortScenario(4.0);
+  near.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  EXPECT_NEAR(inflation_of(near), 1.1, 0.06);
+  EXPECT_GT(inflation_of(FarScenario(4.0)), 1.2);
 }
 
 }  // namespace

@@ -6,11 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <set>
 
 #include "core/rotation_chain.h"
-#include "core/time.h"
-#include "estimator/window/pair_graph.h"
 #include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
@@ -229,79 +226,6 @@ TEST(Refinement, TransferRecoversTheTruthOfAFarSceneOnly) {
   EXPECT_GT(ErrorInSigmas(near->calibration, s.truth).cwiseAbs().maxCoeff(), 10.0);
 }
 
-// What has no transfer is left out when a pair is added: one wrong match of a fast turn, by 80 deg
-// here, must not stop the whole fit.
-TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
-  Prior start;
-  start.mean.width_px = 640;
-  start.mean.height_px = 480;
-  start.mean.lens = MakePinhole(500.0, {319.5, 239.5});
-  start.sigma.setOnes();
-  PairGraphOptions options;
-  options.residual = &ByTransfer();
-  const auto residuals_of = [&](int wrong) {
-    PairGraph graph(start.mean, start, options);
-    for (int i = 0; i < 100; ++i) graph.AddRate({0.005 * i, {42.0, 0.0, 0.0}});
-    std::vector<Match> matches;
-    for (int i = 0; i < 10; ++i) matches.push_back({{60.0 * i, 239.5}, {60.0 * i, 239.5}});
-    // The camera turns up: what was 25 deg below its axis is 105 deg below it.
-    for (int i = 0; i < wrong; ++i) {
-      matches[static_cast<size_t>(i)].px_a.y() = 475.0;
-      matches[static_cast<size_t>(i)].px_b.y() = 5.0;
-    }
-    TimedPair pair;
-    pair.time_a_s = 0.2;
-    pair.time_b_s = 0.2 + 1.0 / 30.0;
-    pair.matches = matches;
-    const AddPairResult added = graph.AddPair(pair);
-    if (added != AddPairResult::kAdded) return -1;
-    return static_cast<int>(graph.Residuals(0, false).size());
-  };
-  EXPECT_EQ(residuals_of(0), 20);
-  EXPECT_EQ(residuals_of(2), 16);
-  EXPECT_EQ(residuals_of(3), -1);  // fewer than 8 left
-}
-
-TEST(PairGraph, NoisyGyrosHaveShorterRateSteps) {
-  PairGraphOptions options;
-  options.gyro_sigma_rad_s.setConstant(0.003);  // of a phone, at 200 Hz
-  EXPECT_EQ(options.RateStep(0.005, 650.0), 5);
-  EXPECT_EQ(options.RateStep(0.05, 650.0), 1);
-  options.gyro_sigma_rad_s.setConstant(0.03);  // 0.1 px per sample
-  EXPECT_EQ(options.RateStep(0.005, 650.0), 3);
-  options.gyro_sigma_rad_s.setConstant(0.3);
-  EXPECT_EQ(options.RateStep(0.005, 650.0), 1);
-}
-
-// Directions that the parallax determines take the degrees of freedom that are counted; the best of
-// many that all say nothing takes more, which widens the sigmas.
-TEST(PairGraph, DirectionsWithoutParallaxWidenTheSigmas) {
-  const auto inflation_of = [](Scenario scenario) {
-    scenario.tracks.count = 100;
-    const Simulated s = SimulateTracks(scenario).value();
-    const EstimationInput input = MakeEstimationInput(s.recording);
-    const Prior prior{s.truth, StateVector::Ones()};
-    PairGraphOptions options;
-    options.sigma = 0.7;
-    PairGraph graph(prior.mean, prior, options);
-    for (const TimedRate& rate : input.rates) graph.AddRate(rate);
-    CrossFit sum;
-    for (const TimedPair& pair : input.pairs) {
-      if (graph.AddPair(pair) != AddPairResult::kAdded) continue;
-      graph.Residuals(pair.id, /*search=*/true);
-      sum += graph.CrossFitOf(pair.id);
-    }
-    // Two to six of some 50 in a half.
-    EXPECT_GT(sum.expected / sum.own, 1.035);
-    EXPECT_LT(sum.expected / sum.own, 1.13);
-    return sum.inflation();
-  };
-  Scenario near = ShortScenario(4.0);
-  near.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
-  EXPECT_NEAR(inflation_of(near), 1.1, 0.06);
-  EXPECT_GT(inflation_of(FarScenario(4.0)), 1.2);
-}
-
 // Without loss the same wrong matches pull the calibration away; they are counted all the same.
 TEST(Refinement, WithoutLossWrongMatchesPull) {
   for (const PairResidual* residual : {&ByPlane(), &ByTransfer()}) {
@@ -474,87 +398,6 @@ TEST(EvaluateUnseen, OfTransfersIsTheNoiseAtTheTruthAndMoreElsewhere) {
   Calibration wrong = s.truth;
   wrong.lens[kFocal] *= 1.1;
   EXPECT_GT(EvaluateUnseen(input, input.pairs, wrong, 0.7, options).rms_px, 1.3 * at_truth.rms_px);
-}
-
-TEST(EstimationInput, HoldsPairsAndRatesOnOneTimeAxis) {
-  const Simulated s = SimulateTracks(ShortScenario(1.0)).value();
-  const EstimationInput input = MakeEstimationInput(s.recording);
-  EXPECT_EQ(input.origin_ns, s.recording.gyro.front().stamp_ns);
-  ASSERT_EQ(input.rates.size(), s.recording.gyro.size());
-  EXPECT_EQ(input.rates.front().time_s, 0.0);
-  EXPECT_EQ(input.rates[7].omega_gyro_rad_s, s.recording.gyro[7].omega_gyro_rad_s);
-  ASSERT_EQ(input.pairs.size(), 30u);
-  const TimedPair& pair = input.pairs[11];
-  EXPECT_EQ(pair.id, 11);
-  EXPECT_EQ(pair.frame_a, 11);
-  EXPECT_EQ(pair.frame_b, 12);
-  EXPECT_EQ(pair.time_b_s, SecondsSince(input.origin_ns, s.recording.frames[12].stamp_ns));
-  EXPECT_EQ(pair.matches.size(), PairsFromTracks(s.recording.tracks, 1)[11].matches.size());
-
-  // Attitudes of neighbouring frames; matches win over both.
-  Recording attitudes = s.recording;
-  attitudes.tracks.clear();
-  for (size_t i = 0; i < attitudes.frames.size(); ++i) {
-    attitudes.q_cam_world.push_back(Exp(Eigen::Vector3d(0.0, 0.01 * static_cast<double>(i), 0.0)));
-  }
-  const EstimationInput rotations = MakeEstimationInput(attitudes);
-  ASSERT_EQ(rotations.pairs.size(), attitudes.frames.size() - 1);
-  EXPECT_EQ(rotations.pairs[8].frame_a, 8);
-  EXPECT_EQ(rotations.pairs[8].frame_b, 9);
-  EXPECT_TRUE(rotations.pairs[8].matches.empty());
-  // World -> camera turns by +0.01: vectors of camera b into camera a turn back.
-  EXPECT_LT((Log(rotations.pairs[8].rotation.q_a_b) - Eigen::Vector3d(0.0, -0.01, 0.0)).norm(),
-            1e-12);
-}
-
-TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
-  Scenario scenario = ShortScenario(4.0);
-  Simulated s = SimulateTracks(scenario).value();
-  s.recording.gyro_info.noise_density_rad_s_rtHz.reset();
-  // 2.1e-4 rad/s/rtHz at 200 Hz.
-  const double expected = 2.1e-4 * std::sqrt(200.0);
-  const Eigen::Vector3d shown = GyroSigma(s.recording, s.truth.delay_s);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(shown[k], expected, 0.15 * expected);
-  s.recording.gyro_info.noise_density_rad_s_rtHz = 5e-4;
-  EXPECT_LT(
-      (GyroSigma(s.recording, 0.0) - Eigen::Vector3d::Constant(5e-4 * std::sqrt(200.0))).norm(),
-      1e-6);
-}
-
-TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
-  simulation::Scenario scenario = ShortScenario(10.0);
-  const Recording recording = SimulateTracks(scenario)->recording;
-  const PairSelection selection = SelectPairs(recording);
-  EXPECT_EQ(selection.gap % 2, 1);
-  EXPECT_EQ(selection.stride, 2);
-  const EstimationInput input = MakeEstimationInput(recording, selection);
-  EXPECT_GE(input.pairs.size(), 100u);
-  size_t matches = 0;
-  std::set<int> seen;
-  for (const TimedPair& pair : input.pairs) {
-    EXPECT_TRUE(seen.insert(pair.frame_a).second && seen.insert(pair.frame_b).second);
-    EXPECT_GE(pair.frame_b - pair.frame_a, 3);
-    matches += pair.matches.size();
-  }
-  EXPECT_GT(static_cast<double>(matches) / static_cast<double>(input.pairs.size()), 30.0);
-
-  Recording reanchored = recording;
-  reanchored.match_noise = MatchNoise::kSecondImage;
-  EXPECT_EQ(SelectPairs(reanchored).gap, 1);
-
-  // Too short for 100 pairs, or tracks too short: neighbours.
-  EXPECT_EQ(SelectPairs(SimulateTracks(ShortScenario(3.0))->recording).gap, 1);
-  scenario.tracks.mean_life_frames = 4.0;
-  EXPECT_EQ(SelectPairs(SimulateTracks(scenario)->recording).gap, 1);
-}
-
-TEST(SideBySide, LeavesPairsOutThatOverlap) {
-  const Recording recording = SimulateTracks(ShortScenario(1.0))->recording;
-  const EstimationInput input = MakeEstimationInput(recording, {5, 2});
-  ASSERT_EQ(input.pairs.size(), 13u);
-  const std::vector<TimedPair> pairs = SideBySide(input.pairs);
-  ASSERT_EQ(pairs.size(), 5u);
-  for (size_t i = 0; i < pairs.size(); ++i) EXPECT_EQ(pairs[i].frame_a, 6 * static_cast<int>(i));
 }
 
 }  // namespace

@@ -1,0 +1,102 @@
+#include "estimator/window/estimation_input.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "core/so3.h"
+#include "core/time.h"
+#include "tests/estimator/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+using simulation::Scenario;
+using simulation::Simulated;
+using simulation::SimulateTracks;
+
+TEST(EstimationInput, HoldsPairsAndRatesOnOneTimeAxis) {
+  const Simulated s = SimulateTracks(ShortScenario(1.0)).value();
+  const EstimationInput input = MakeEstimationInput(s.recording);
+  EXPECT_EQ(input.origin_ns, s.recording.gyro.front().stamp_ns);
+  ASSERT_EQ(input.rates.size(), s.recording.gyro.size());
+  EXPECT_EQ(input.rates.front().time_s, 0.0);
+  EXPECT_EQ(input.rates[7].omega_gyro_rad_s, s.recording.gyro[7].omega_gyro_rad_s);
+  ASSERT_EQ(input.pairs.size(), 30u);
+  const TimedPair& pair = input.pairs[11];
+  EXPECT_EQ(pair.id, 11);
+  EXPECT_EQ(pair.frame_a, 11);
+  EXPECT_EQ(pair.frame_b, 12);
+  EXPECT_EQ(pair.time_b_s, SecondsSince(input.origin_ns, s.recording.frames[12].stamp_ns));
+  EXPECT_EQ(pair.matches.size(), PairsFromTracks(s.recording.tracks, 1)[11].matches.size());
+
+  // Attitudes of neighbouring frames; matches win over both.
+  Recording attitudes = s.recording;
+  attitudes.tracks.clear();
+  for (size_t i = 0; i < attitudes.frames.size(); ++i) {
+    attitudes.q_cam_world.push_back(Exp(Eigen::Vector3d(0.0, 0.01 * static_cast<double>(i), 0.0)));
+  }
+  const EstimationInput rotations = MakeEstimationInput(attitudes);
+  ASSERT_EQ(rotations.pairs.size(), attitudes.frames.size() - 1);
+  EXPECT_EQ(rotations.pairs[8].frame_a, 8);
+  EXPECT_EQ(rotations.pairs[8].frame_b, 9);
+  EXPECT_TRUE(rotations.pairs[8].matches.empty());
+  // World -> camera turns by +0.01: vectors of camera b into camera a turn back.
+  EXPECT_LT((Log(rotations.pairs[8].rotation.q_a_b) - Eigen::Vector3d(0.0, -0.01, 0.0)).norm(),
+            1e-12);
+}
+
+TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
+  Scenario scenario = ShortScenario(4.0);
+  Simulated s = SimulateTracks(scenario).value();
+  s.recording.gyro_info.noise_density_rad_s_rtHz.reset();
+  // 2.1e-4 rad/s/rtHz at 200 Hz.
+  const double expected = 2.1e-4 * std::sqrt(200.0);
+  const Eigen::Vector3d shown = GyroSigma(s.recording, s.truth.delay_s);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(shown[k], expected, 0.15 * expected);
+  s.recording.gyro_info.noise_density_rad_s_rtHz = 5e-4;
+  EXPECT_LT(
+      (GyroSigma(s.recording, 0.0) - Eigen::Vector3d::Constant(5e-4 * std::sqrt(200.0))).norm(),
+      1e-6);
+}
+
+TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
+  simulation::Scenario scenario = ShortScenario(10.0);
+  const Recording recording = SimulateTracks(scenario)->recording;
+  const PairSelection selection = SelectPairs(recording);
+  EXPECT_EQ(selection.gap % 2, 1);
+  EXPECT_EQ(selection.stride, 2);
+  const EstimationInput input = MakeEstimationInput(recording, selection);
+  EXPECT_GE(input.pairs.size(), 100u);
+  size_t matches = 0;
+  std::set<int> seen;
+  for (const TimedPair& pair : input.pairs) {
+    EXPECT_TRUE(seen.insert(pair.frame_a).second && seen.insert(pair.frame_b).second);
+    EXPECT_GE(pair.frame_b - pair.frame_a, 3);
+    matches += pair.matches.size();
+  }
+  EXPECT_GT(static_cast<double>(matches) / static_cast<double>(input.pairs.size()), 30.0);
+
+  Recording reanchored = recording;
+  reanchored.match_noise = MatchNoise::kSecondImage;
+  EXPECT_EQ(SelectPairs(reanchored).gap, 1);
+
+  // Too short for 100 pairs, or tracks too short: neighbours.
+  EXPECT_EQ(SelectPairs(SimulateTracks(ShortScenario(3.0))->recording).gap, 1);
+  scenario.tracks.mean_life_frames = 4.0;
+  EXPECT_EQ(SelectPairs(SimulateTracks(scenario)->recording).gap, 1);
+}
+
+TEST(SideBySide, LeavesPairsOutThatOverlap) {
+  const Recording recording = SimulateTracks(ShortScenario(1.0))->recording;
+  const EstimationInput input = MakeEstimationInput(recording, {5, 2});
+  ASSERT_EQ(input.pairs.size(), 13u);
+  const std::vector<TimedPair> pairs = SideBySide(input.pairs);
+  ASSERT_EQ(pairs.size(), 5u);
+  for (size_t i = 0; i < pairs.size(); ++i) EXPECT_EQ(pairs[i].frame_a, 6 * static_cast<int>(i));
+}
+
+}  // namespace
+}  // namespace camgyro
