@@ -11,8 +11,8 @@
 
 namespace camgyro {
 
-// Names of the flags that OpenRecording obeys: guesses that win over the recording's own, what is to
-// be done about stamps and faults of the data, and the threads to work in.
+// Names of the flags that OpenRecording obeys: guesses that win over the recording's own, what is
+// to be done about stamps and faults of the data, and the threads to work in.
 std::vector<std::string> InputFlags();
 
 // --stamps and --strict, for commands that read a recording without the guesses.

@@ -18,7 +18,7 @@ namespace camgyro {
 struct VinsInput {
   // Values; its covariance, the total one where it is known, is the prior of the refinement.
   Calibration calibration;
-  std::vector<int64_t> frame_stamps_ns;  // camera clock, increasing
+  std::vector<int64_t> frame_stamps_ns;           // camera clock, increasing
   std::vector<std::vector<TrackedPoint>> tracks;  // one entry per frame, by ascending track id
   std::vector<GyroSample> gyro;                   // covers the frames on the gyro's clock
   std::vector<AccelSample> accel;                 // the same clock; empty: no accelerometer
