@@ -29,7 +29,8 @@ class Draw {
     e.prior_value = Eigen::Vector4d(3.0, -2.0, 1.0, 0.0);
     e.prior_sigma = Eigen::Vector4d::Constant(100.0);
     const Eigen::Matrix4d prior = e.prior_sigma.cwiseAbs2().cwiseInverse().asDiagonal();
-    const Eigen::Vector4d measured = root * Normal() + between * Normal();
+    const Eigen::Vector4d shift = Normal(), error = Normal();  // drawn in this order
+    const Eigen::Vector4d measured = root * error + between * shift;
     e.covariance = (data.inverse() + prior).inverse();
     e.value = e.covariance * (data.inverse() * measured + prior * e.prior_value);
     e.systematic = Eigen::Matrix4d::Zero();

@@ -79,8 +79,11 @@ std::vector<Trial> Trials(int count, double wrong) {
     const auto num_wrong = static_cast<size_t>(std::lround(80 * wrong));
     for (size_t i = 0; i < s.pair->matches.size(); ++i) {
       Match& match = s.pair->matches[i];
-      match.px_a += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));
-      match.px_b += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));
+      // One draw after the other: in which order arguments are evaluated is the compiler's choice.
+      for (Eigen::Vector2d* px : {&match.px_a, &match.px_b}) {
+        px->y() += 0.3 * normal(generator);
+        px->x() += 0.3 * normal(generator);
+      }
       if (i < num_wrong) {
         const double angle = 2.0 * M_PI * uniform(generator);
         match.px_b +=
@@ -93,7 +96,8 @@ std::vector<Trial> Trials(int count, double wrong) {
     const CostAndInformation truth = At(bearings, variance, s.tau);
     double cover = truth.cost;
     for (int k = 0; k < 3000; ++k) {
-      const Vector3d tau(normal(generator), normal(generator), normal(generator));
+      Vector3d tau;
+      for (const int axis : {2, 1, 0}) tau[axis] = normal(generator);
       cover = std::min(cover, At(bearings, variance, tau.normalized()).cost);
     }
     trials.push_back({AngleDeg(found.tau, s.tau),
