@@ -115,7 +115,7 @@ class AxialLens final : public Lens {
 
  private:
   // Without distortion, and without derivatives by it: what the rest of this class computes then,
-  // at a fifth of its time.
+  // without inverting a distortion that is not there.
   static bool UnprojectPinhole(const Eigen::Vector2d& xy, double fx, double fy,
                                LensDerivatives by_lens, RayJet* out) {
     if (!xy.allFinite()) return false;

@@ -27,8 +27,8 @@ std::vector<Vector3d> HalfSphere(int count) {
 }
 
 // The plane residuals of two matches, prepared for many directions: numerator and sigma are linear
-// in the direction and the norm of a linear form. Two beside each other, because one form of five
-// rows takes the processor six times as long as a half of two.
+// in the direction and the norm of a linear form. Two beside each other fill the processor's
+// registers, which the five rows of one match do not.
 struct TwoMatches {
   using Two = Eigen::Array2d;
   static constexpr int kForms = 5;  // x . (a x b), and its derivatives by the pixels in sigmas
