@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/recording_csv.h"
 #include "core/time.h"
 #include "simulation/render.h"
 #include "simulation/video_encoder.h"
@@ -44,48 +45,22 @@ class TextFile {
   std::FILE* file_;
 };
 
+Status WriteText(const fs::path& path, const std::string& text) {
+  TextFile file(path);
+  file.Print("%s", text.c_str());
+  return file.Close();
+}
+
 long long Stamp(int64_t stamp_ns) { return static_cast<long long>(stamp_ns); }
 
 std::string ImageName(const Frame& frame) { return std::to_string(frame.stamp_ns) + ".png"; }
 
 Status WriteFrames(const Simulated& s, const Scenario& scenario, const fs::path& cam) {
-  TextFile file(cam / "data.csv");
-  file.Print("#timestamp [ns],filename,exposure [s]\n");
-  for (const Frame& frame : s.recording.frames) {
-    const std::string name =
-        scenario.video.format == VideoFormat::kPng ? ImageName(frame) : std::string();
-    file.Print("%lld,%s,%.9f\n", Stamp(frame.stamp_ns), name.c_str(), frame.exposure_s);
+  std::vector<Frame> frames = s.recording.frames;
+  for (Frame& frame : frames) {
+    frame.image_file = scenario.video.format == VideoFormat::kPng ? ImageName(frame) : "";
   }
-  return file.Close();
-}
-
-Status WriteTracks(const Recording& recording, const fs::path& cam) {
-  TextFile file(cam / "tracks.csv");
-  file.Print("#timestamp [ns],track_id,u [px],v [px]\n");
-  for (size_t i = 0; i < recording.tracks.size(); ++i) {
-    for (const TrackedPoint& point : recording.tracks[i]) {
-      file.Print("%lld,%lld,%.9f,%.9f\n", Stamp(recording.frames[i].stamp_ns),
-                 static_cast<long long>(point.track_id), point.px.x(), point.px.y());
-    }
-  }
-  return file.Close();
-}
-
-Status WriteImu(const Recording& recording, const fs::path& imu) {
-  TextFile file(imu / "data.csv");
-  const bool accel = !recording.accel.empty();
-  file.Print("#timestamp [ns],w_x [rad s^-1],w_y [rad s^-1],w_z [rad s^-1]%s\n",
-             accel ? ",a_x [m s^-2],a_y [m s^-2],a_z [m s^-2]" : "");
-  for (size_t i = 0; i < recording.gyro.size(); ++i) {
-    const Eigen::Vector3d& w = recording.gyro[i].omega_gyro_rad_s;
-    file.Print("%lld,%.9g,%.9g,%.9g", Stamp(recording.gyro[i].stamp_ns), w.x(), w.y(), w.z());
-    if (accel) {
-      const Eigen::Vector3d& a = recording.accel[i].accel_gyro_m_s2;
-      file.Print(",%.7g,%.7g,%.7g", a.x(), a.y(), a.z());
-    }
-    file.Print("\n");
-  }
-  return file.Close();
+  return WriteText(cam / "data.csv", FramesCsv(frames));
 }
 
 Status WriteSensorYaml(const Simulated& s, const Scenario& scenario, const fs::path& root) {
@@ -223,9 +198,9 @@ Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
     fs::create_directories(root / "imu0");
     Status status = WriteFrames(simulated, scenario, root / "cam0");
     if (status && !simulated.recording.tracks.empty()) {
-      status = WriteTracks(simulated.recording, root / "cam0");
+      status = WriteText(root / "cam0/tracks.csv", TracksCsv(simulated.recording, 9));
     }
-    if (status) status = WriteImu(simulated.recording, root / "imu0");
+    if (status) status = WriteText(root / "imu0/data.csv", ImuCsv(simulated.recording));
     if (status) status = WriteSensorYaml(simulated, scenario, root);
     if (status) status = WriteTruth(simulated, scenario, root);
     if (status) status = WriteTrajectory(simulated, scenario, root);

@@ -20,6 +20,7 @@ namespace camgyro {
   ROW(Compare)                \
   ROW(Export)                 \
   ROW(Stabilize)              \
+  ROW(Rectify)                \
   ROW(Help)
 
 #define CAMGYRO_DECLARE(name) Command name##Command();

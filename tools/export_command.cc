@@ -25,13 +25,6 @@ DEFINE_string(recording, "",
 namespace camgyro {
 namespace {
 
-Result<ExportFormat> FindFormat(const std::string& name) {
-  for (const ExportFormat& format : ExportFormats()) {
-    if (format.name == name) return format;
-  }
-  return BadUsage("--format=" + name + ": expected one of " + ExportFormatNames());
-}
-
 std::string Join(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
@@ -66,7 +59,7 @@ std::vector<std::string> Caveats(const ExportInput& input, const std::vector<std
 }
 
 Status RunExport(const std::vector<std::string>& arguments) {
-  const Result<ExportFormat> format = FindFormat(FLAGS_format);
+  const Result<ExportFormat> format = FindExportFormat(FLAGS_format);
   if (!format) return tl::unexpected(format.error());
   if (FLAGS_out.empty()) return BadUsage("--out: expected a folder to write into");
   FileSet files(FLAGS_out);

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <optional>
-#include <sstream>
 
+#include "core/recording_csv.h"
 #include "frontend/track_recording.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/result_files.h"
@@ -24,20 +24,6 @@ DEFINE_int32(max_points, 200, "corners followed per frame");
 
 namespace camgyro {
 namespace {
-
-std::string TracksCsv(const Recording& recording) {
-  std::ostringstream out;
-  out << "#timestamp [ns],track_id,u [px],v [px]\n";
-  out.precision(4);
-  out << std::fixed;
-  for (size_t i = 0; i < recording.tracks.size(); ++i) {
-    for (const TrackedPoint& point : recording.tracks[i]) {
-      out << recording.frames[i].stamp_ns << "," << point.track_id << "," << point.px.x() << ","
-          << point.px.y() << "\n";
-    }
-  }
-  return out.str();
-}
 
 Status RunTrack(const std::vector<std::string>& arguments) {
   if (FLAGS_max_points < 1) return BadUsage("--max_points: expected at least 1");
@@ -68,7 +54,7 @@ Status RunTrack(const std::vector<std::string>& arguments) {
   }
   if (!summary) return tl::unexpected(summary.error());
   if (Status strict = CheckStrict(*recording); !strict) return strict;
-  files.Add("cam0/tracks.csv", TracksCsv(*recording));
+  files.Add("cam0/tracks.csv", TracksCsv(*recording, 4));
   if (Status written = files.Write(); !written) return written;
   if (FLAGS_quiet) return {};
   std::printf("%s: %s\n%s%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),

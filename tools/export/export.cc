@@ -39,6 +39,13 @@ const std::vector<ExportFormat>& ExportFormats() {
   return formats;
 }
 
+Result<ExportFormat> FindExportFormat(const std::string& name) {
+  for (const ExportFormat& format : ExportFormats()) {
+    if (format.name == name) return format;
+  }
+  return BadUsage("--format=" + name + ": expected one of " + ExportFormatNames());
+}
+
 std::string ExportFormatNames() { return Column(&ExportFormat::name); }
 std::string ExportPrograms() { return Column(&ExportFormat::program); }
 

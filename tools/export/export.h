@@ -15,6 +15,7 @@
 
 #include "core/calibration.h"
 #include "core/recording.h"
+#include "core/result.h"
 
 namespace camgyro {
 
@@ -41,6 +42,9 @@ struct ExportFormat {
 // All formats, in the order of the help. A new one is a file of this folder and a row of the table
 // in export.cc.
 const std::vector<ExportFormat>& ExportFormats();
+
+// The format of this name. Error: kBadUsage, with the names that there are.
+Result<ExportFormat> FindExportFormat(const std::string& name);
 
 // The column `name`, or `program`, of all formats, separated by commas.
 std::string ExportFormatNames();

@@ -50,6 +50,27 @@ bool CameraPath::Covers(int frame) const {
   return std::min(a, b) >= chain_.times_s().front() && std::max(a, b) <= chain_.times_s().back();
 }
 
+Status CheckCalibrationFits(const Recording& recording, const Calibration& calibration,
+                            const CameraPath& path) {
+  const auto size = [](int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+  };
+  if (recording.camera.width_px != calibration.width_px ||
+      recording.camera.height_px != calibration.height_px) {
+    return BadInput(recording.path + ": has pictures of " +
+                    size(recording.camera.width_px, recording.camera.height_px) +
+                    " pixels, expected " + size(calibration.width_px, calibration.height_px) +
+                    " as the calibration was made for");
+  }
+  if (path.last_frame() <= path.first_frame()) {
+    return BadInput(recording.path + ": with the calibration's delay of " +
+                    std::to_string(calibration.delay_s) +
+                    " s no two frames lie within the gyro's time: is it of another recording, "
+                    "with other clocks?");
+  }
+  return {};
+}
+
 std::vector<Eigen::Quaterniond> SmoothOrientations(const CameraPath& path, double middle_row_px,
                                                    double smooth_s) {
   std::vector<double> times;

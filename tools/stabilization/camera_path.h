@@ -8,6 +8,7 @@
 
 #include "core/calibration.h"
 #include "core/recording.h"
+#include "core/result.h"
 #include "core/rotation_chain.h"
 
 namespace camgyro {
@@ -39,6 +40,11 @@ class CameraPath {
   RotationChain chain_;
   int first_frame_ = 0, last_frame_ = -1;
 };
+
+// Is the calibration one of this recording's camera and clocks? kBadInput if pictures have another
+// size than it was made for, or no two frames lie within the gyro's time.
+Status CheckCalibrationFits(const Recording& recording, const Calibration& calibration,
+                            const CameraPath& path);
 
 // One orientation for each frame first..last of the path: that of its middle row, averaged over
 // time with a Gaussian of this standard deviation. 0: as it is. Turning at a constant rate stays as

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <vector>
 
-#include "core/lens.h"
-
 namespace camgyro {
 namespace {
 
@@ -14,23 +12,29 @@ constexpr float kNowhere = -1e4f;  // far outside of every picture
 
 }  // namespace
 
+VirtualCamera::VirtualCamera(const Calibration& calibration)
+    : width_px(calibration.width_px),
+      height_px(calibration.height_px),
+      model(calibration.distortion_model),
+      lens(calibration.lens) {}
+
 VirtualCamera::VirtualCamera(const Calibration& calibration, int width, int height, double zoom)
-    : width_px(width),
-      height_px(height),
-      fx_px(zoom * calibration.lens[kFocal] * calibration.lens[kAspect]),
-      fy_px(zoom * calibration.lens[kFocal]) {
+    : width_px(width), height_px(height) {
   const Eigen::Vector2d centre(0.5 * (width - 1), 0.5 * (height - 1));
-  principal_px = centre + zoom * (calibration.lens.segment<2>(kCx) - centre);
+  lens = MakePinhole(zoom * calibration.lens[kFocal],
+                     centre + zoom * (calibration.lens.segment<2>(kCx) - centre),
+                     calibration.lens[kAspect]);
 }
 
-Eigen::Vector3d VirtualCamera::Ray(const Eigen::Vector2d& px) const {
-  return {(px.x() - principal_px.x()) / fx_px, (px.y() - principal_px.y()) / fy_px, 1.0};
+std::optional<Eigen::Vector3d> VirtualCamera::Ray(const Eigen::Vector2d& px) const {
+  RayJet jet;
+  if (!GetLens(model).Unproject(px, lens, &jet, LensDerivatives::kNone)) return std::nullopt;
+  return jet.ray;
 }
 
 std::optional<Eigen::Vector2d> VirtualCamera::Project(const Eigen::Vector3d& ray) const {
   if (!(ray.z() > 1e-3 * ray.norm())) return std::nullopt;
-  return Eigen::Vector2d(fx_px * ray.x() / ray.z() + principal_px.x(),
-                         fy_px * ray.y() / ray.z() + principal_px.y());
+  return GetLens(model).Project(ray, lens);
 }
 
 FrameWarp::FrameWarp(const CameraPath& path, const Calibration& calibration, int frame,
@@ -61,12 +65,13 @@ std::optional<Eigen::Vector2d> FrameWarp::ToVirtual(const Eigen::Vector2d& px) c
 }
 
 std::optional<Eigen::Vector2d> FrameWarp::ToSource(const Eigen::Vector2d& px_virtual) const {
-  const Eigen::Vector3d ray = camera_.Ray(px_virtual);
+  const std::optional<Eigen::Vector3d> ray = camera_.Ray(px_virtual);
+  if (!ray) return std::nullopt;
   // A row later is seen line_delay later, when the point has moved by far less than a row.
   double row = std::clamp(px_virtual.y(), 0.0, static_cast<double>(calibration_.height_px));
   std::optional<Eigen::Vector2d> px;
   for (int i = 0; i < 6; ++i) {
-    px = lens_.Project(R_virtual_cam(row).transpose() * ray, calibration_.lens);
+    px = lens_.Project(R_virtual_cam(row).transpose() * *ray, calibration_.lens);
     if (!px || std::abs(px->y() - row) < 0.02) break;
     row = px->y();
   }

@@ -9,19 +9,24 @@
 #include <optional>
 
 #include "core/calibration.h"
+#include "core/lens.h"
 #include "tools/stabilization/camera_path.h"
 
 namespace camgyro {
 
-// The virtual camera: the calibrated one without its distortion, zoomed about the centre of the
-// picture, so that at zoom 1 and from the camera's own orientation the picture stays where it is.
+// The camera of the picture that is made.
 struct VirtualCamera {
   int width_px = 0, height_px = 0;
-  double fx_px = 0.0, fy_px = 0.0;
-  Eigen::Vector2d principal_px;
+  DistortionModel model = DistortionModel::kNone;
+  LensParameters lens = LensParameters::Zero();
 
+  // Size and lens of the calibrated one.
+  explicit VirtualCamera(const Calibration& calibration);
+  // The calibrated one without its distortion, zoomed about the centre of the picture, so that at
+  // zoom 1 and from the camera's own orientation the picture stays where it is.
   VirtualCamera(const Calibration& calibration, int width_px, int height_px, double zoom);
-  Eigen::Vector3d Ray(const Eigen::Vector2d& px) const;
+  // Nothing where the lens has no ray.
+  std::optional<Eigen::Vector3d> Ray(const Eigen::Vector2d& px) const;
   // Nothing for rays that do not point forwards.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& ray) const;
 };

@@ -180,30 +180,6 @@ FramePair MatchFrames(int frame, const cv::Mat& before, const cv::Mat& now) {
   return {frame - 1, frame, MatchesBetween(a, b)};
 }
 
-Status CheckInput(const Recording& recording, const Calibration& calibration,
-                  const CameraPath& path) {
-  if (!recording.HasImages()) {
-    return BadInput(recording.path + ": has neither images nor a video to stabilise");
-  }
-  const auto size = [](int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  };
-  if (recording.camera.width_px != calibration.width_px ||
-      recording.camera.height_px != calibration.height_px) {
-    return BadInput(recording.path + ": has pictures of " +
-                    size(recording.camera.width_px, recording.camera.height_px) +
-                    " pixels, expected " + size(calibration.width_px, calibration.height_px) +
-                    " as the calibration was made for");
-  }
-  if (path.last_frame() <= path.first_frame()) {
-    return BadInput(recording.path + ": with the calibration's delay of " +
-                    std::to_string(calibration.delay_s) +
-                    " s no two frames lie within the gyro's time: is it of another recording, "
-                    "with other clocks?");
-  }
-  return {};
-}
-
 }  // namespace
 
 Result<StabilizeReport> Stabilize(const Recording& recording, const Calibration& calibration,
@@ -213,7 +189,10 @@ Result<StabilizeReport> Stabilize(const Recording& recording, const Calibration&
   const auto begin = std::chrono::steady_clock::now();
   Stabilizer stabilizer(recording, calibration, options);
   const CameraPath& path = stabilizer.path();
-  if (Status sound = CheckInput(recording, calibration, path); !sound) {
+  if (!recording.HasImages()) {
+    return BadInput(recording.path + ": has neither images nor a video to stabilise");
+  }
+  if (Status sound = CheckCalibrationFits(recording, calibration, path); !sound) {
     return tl::unexpected(sound.error());
   }
   StabilizeReport report;

@@ -1,0 +1,26 @@
+// The tables of a recording in the EuRoC layout (docs/recording_format.md), as text.
+#ifndef CAMGYRO_CORE_RECORDING_CSV_H_
+#define CAMGYRO_CORE_RECORDING_CSV_H_
+
+#include <string>
+#include <vector>
+
+#include "core/recording.h"
+
+namespace camgyro {
+
+// cam0/data.csv: stamps [ns], names of the image files without their folders, exposures [s], empty
+// where a frame has none.
+std::string FramesCsv(const std::vector<Frame>& frames);
+
+// cam0/tracks.csv: one row per point, pixels with so many decimals.
+std::string TracksCsv(const Recording& recording, int decimals);
+
+// imu0/data.csv: rates [rad/s] and, if the recording has an accelerometer, specific forces [m/s^2],
+// all at the gyro's stamps: between its own samples the specific force is interpolated, and gyro
+// samples before the first or after the last of them are left out.
+std::string ImuCsv(const Recording& recording);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_CORE_RECORDING_CSV_H_
