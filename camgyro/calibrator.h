@@ -26,7 +26,7 @@ namespace camgyro::api {
 
 struct CalibratorOptions {
   CameraGuess camera;  // the size is needed
-  // Ready means: standard deviation below these, and steady for two seconds.
+  // Ready means: total standard deviation below these, and steady for two seconds.
   double ready_focal = 0.01;      // of the focal length
   double ready_principal = 0.01;  // of the width
   double ready_readout_s = 1e-3;
@@ -36,6 +36,8 @@ struct CalibratorOptions {
   // Stamps of the gyro that are times of arrival are replaced by the sampling clock behind them,
   // with kAuto; samples then reach the estimate half a second later. The accelerometer's stay.
   Stamps stamps = Stamps::kAuto;
+  // Sizes of undeclared effects, for the total sigmas.
+  Device device = Device::kPhone;
   // Seconds of motion before the first search for a start.
   double start_s = 5.0;
   // Images (or frames of tracks) that wait for the worker; beyond, kQueueFull.
@@ -51,15 +53,16 @@ enum class Stage {
 enum class Readiness {
   kNoEstimate,
   kUndetermined,  // the motion so far tells next to nothing of it
-  kImprecise,     // known, but not to the sigma asked for
+  kImprecise,     // known, but its total sigma is not the one asked for, or not known yet
   kUnsteady,      // its estimate still moves by more than that
   kReady,
 };
 CAMGYRO_API const char* ToString(Readiness readiness) noexcept;
 
 struct ParameterState {
-  double value = 0.0;  // 0 for the three angles: see Calibration::q_gyro_cam_wxyz
-  double sigma = 0.0;
+  double value = 0.0;        // 0 for the three angles: see Calibration::q_gyro_cam_wxyz
+  double sigma = 0.0;        // of noise
+  double sigma_total = 0.0;  // with what undeclared effects may add; infinite: not known yet
   double wanted_sigma = 0.0;
   Readiness readiness = Readiness::kNoEstimate;
 };
@@ -68,6 +71,7 @@ struct Snapshot {
   Stage stage = Stage::kCollecting;
   std::string message;      // for people
   std::string gyro_stamps;  // what they are, for people; empty before two seconds, or kRecorded
+  std::string doubt;  // for people: the pictures show an effect that the model lacks; or empty
   Calibration calibration;  // meaningful once `has_estimate`
   bool has_estimate = false;
   std::array<ParameterState, kParameters> parameters{};

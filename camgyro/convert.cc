@@ -63,12 +63,10 @@ api::Calibration ToApi(const Calibration& calibration) {
   c.bias_gyro_rad_s = ToApi(calibration.bias_gyro_rad_s);
   c.q_gyro_cam_wxyz = ToApi(calibration.q_gyro_cam);
   static_assert(static_cast<int>(api::kParameters) == static_cast<int>(kStateSize));
-  for (int row = 0; row < kStateSize; ++row) {
-    for (int column = 0; column < kStateSize; ++column) {
-      c.covariance[static_cast<size_t>(row * kStateSize + column)] =
-          calibration.covariance(row, column);
-    }
-  }
+  // Symmetric: the order of rows and columns is the same.
+  Eigen::Map<StateCovariance>(c.covariance.data()) = calibration.covariance;
+  Eigen::Map<StateCovariance>(c.total_covariance.data()) = calibration.total_covariance.value_or(
+      StateCovariance::Constant(std::numeric_limits<double>::infinity()));
   return c;
 }
 
@@ -103,6 +101,18 @@ api::VinsStart ToApi(const Result<VinsStart>& start) {
   result.scale_sigma = start->scale_sigma;
   result.gravity_sigma_rad = start->gravity_sigma_rad;
   return result;
+}
+
+DeviceClass FromApi(api::Device device) {
+  switch (device) {
+    case api::Device::kActionCamera:
+      return DeviceClass::kActionCamera;
+    case api::Device::kIndustrial:
+      return DeviceClass::kIndustrial;
+    case api::Device::kPhone:
+      break;
+  }
+  return DeviceClass::kPhone;
 }
 
 Result<CameraGuess> FromApi(const api::CameraGuess& guess) {

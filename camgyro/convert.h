@@ -9,6 +9,7 @@
 #include "core/calibration.h"
 #include "core/recording.h"
 #include "core/result.h"
+#include "estimator/diagnosis/device_class.h"
 #include "estimator/vins/initialise.h"
 
 namespace camgyro {
@@ -16,6 +17,7 @@ namespace camgyro {
 api::Calibration ToApi(const Calibration& calibration);
 api::VinsStart ToApi(const Result<VinsStart>& start);
 
+DeviceClass FromApi(api::Device device);
 // Errors: kBadUsage naming what is not finite or out of range.
 Result<CameraGuess> FromApi(const api::CameraGuess& guess);
 Result<VinsOptions> FromApi(const api::VinsSettings& settings);

@@ -7,7 +7,6 @@
 namespace camgyro::api {
 namespace {
 
-constexpr double kRecentFramesS = 12.0;
 constexpr std::size_t kMaxRecentFrames = 2000;
 
 }  // namespace

@@ -22,7 +22,7 @@ void Trim(std::deque<Stamped>* items, double keep_s, std::size_t keep) {
   }
 }
 
-// Of samples; of frames 12 s.
+constexpr double kRecentFramesS = 12.0;
 constexpr double kRecentSamplesS = 20.0;
 constexpr std::size_t kMaxRecentSamples = 50'000;
 

@@ -1,6 +1,7 @@
 #include "camgyro/snapshot.h"
 
 #include <cstddef>
+#include <limits>
 
 #include "camgyro/convert.h"
 
@@ -18,6 +19,13 @@ StateVector WantedSigmas(const CalibratorOptions& options, const camgyro::Calibr
   return wanted;
 }
 
+Readiness ReadinessOf(double sigma, double prior_sigma, double error, double wanted,
+                      double movement) {
+  if (!(sigma < 0.5 * prior_sigma)) return Readiness::kUndetermined;
+  if (!(error <= wanted)) return Readiness::kImprecise;
+  return movement <= 2.0 * wanted ? Readiness::kReady : Readiness::kUnsteady;
+}
+
 void FillEstimate(const OnlineCalibration::Progress& progress, const CalibratorOptions& options,
                   Snapshot* next) {
   const camgyro::Calibration& c = *progress.estimate;
@@ -26,16 +34,17 @@ void FillEstimate(const OnlineCalibration::Progress& progress, const CalibratorO
   const StateVector value = ValuesOf(c, c.q_gyro_cam);
   const StateVector wanted = WantedSigmas(options, c);
   const StateVector sigma = c.sigma();
+  const StateVector total =
+      c.sigma_total().value_or(StateVector::Constant(std::numeric_limits<double>::infinity()));
   next->ready = true;
   for (int i = 0; i < kStateSize; ++i) {
     ParameterState& p = next->parameters[static_cast<std::size_t>(i)];
     p.value = value[i];
     p.sigma = sigma[i];
+    p.sigma_total = total[i];
     p.wanted_sigma = wanted[i];
-    p.readiness = !(sigma[i] < 0.5 * progress.prior_sigma[i])  ? Readiness::kUndetermined
-                  : !(sigma[i] <= wanted[i])                   ? Readiness::kImprecise
-                  : !(progress.movement[i] <= 2.0 * wanted[i]) ? Readiness::kUnsteady
-                                                               : Readiness::kReady;
+    p.readiness =
+        ReadinessOf(sigma[i], progress.prior_sigma[i], total[i], wanted[i], progress.movement[i]);
     next->ready = next->ready && p.readiness == Readiness::kReady;
   }
 }
@@ -55,6 +64,20 @@ Snapshot MakeSnapshot(const OnlineCalibration::Progress& progress,
   next.starts = progress.starts;
   if (progress.estimate) FillEstimate(progress, options, &next);
   return next;
+}
+
+bool ReadyButForTotal(const OnlineCalibration::Progress& progress,
+                      const CalibratorOptions& options) {
+  if (!progress.estimate) return false;
+  const StateVector wanted = WantedSigmas(options, *progress.estimate);
+  const StateVector sigma = progress.estimate->sigma();
+  for (int i = 0; i < kStateSize; ++i) {
+    if (ReadinessOf(sigma[i], progress.prior_sigma[i], sigma[i], wanted[i], progress.movement[i]) !=
+        Readiness::kReady) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace camgyro::api

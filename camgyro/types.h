@@ -82,13 +82,18 @@ struct Calibration {
   double delay_s = 0.0;
   Vec3 bias_gyro_rad_s{};
   std::array<double, 4> q_gyro_cam_wxyz{1.0, 0.0, 0.0, 0.0};
-  std::array<double, kParameters * kParameters> covariance{};  // row after row
+  std::array<double, kParameters * kParameters> covariance{};  // of noise; row after row
+  // Mean squared error with what undeclared effects may add; all infinite: not known (yet).
+  std::array<double, kParameters * kParameters> total_covariance{};
 };
 
 enum class Stamps {
   kAuto,      // repaired where they are clearly times of arrival
   kRecorded,  // used as they are
 };
+
+// What devices of its class usually have and nobody declares (docs/uncertainty.md).
+enum class Device { kPhone, kActionCamera, kIndustrial };
 
 // What is known before. Absent: to be found.
 struct CameraGuess {

@@ -23,7 +23,10 @@ constexpr double kLateS = 10.0;  // a frame this far behind the gyro is of no us
 }  // namespace
 
 Calibrator::Worker::Worker(const CalibratorOptions& options, const camgyro::CameraGuess& camera)
-    : options_(options), camera_(camera), cleaner_(camera.width_px, camera.height_px, kFirstCutId) {
+    : options_(options),
+      camera_(camera),
+      cleaner_(camera.width_px, camera.height_px, kFirstCutId),
+      total_(camera, FromApi(options.device)) {
   auto first = std::make_shared<Snapshot>();
   first->message = "collecting the first frames";
   std::atomic_store(&snapshot_, std::shared_ptr<const Snapshot>(first));
@@ -204,8 +207,27 @@ void Calibrator::Worker::Process(const std::vector<GyroSample>& recorded, FrameI
   online_->AddFrame({frame->stamp_ns, std::move(points)});
 }
 
-void Calibrator::Worker::Publish(const OnlineCalibration::Progress& progress) {
+// Not before it can make the estimate ready: at a poor estimate, derivatives say little.
+void Calibrator::Worker::RenewTotal(const OnlineCalibration::Progress& progress) {
+  if (!progress.estimate) return total_.Forget();
+  if (!total_.Due(progress.frame_stamp_ns) || !ReadyButForTotal(progress, options_)) return;
+  VinsInput latest;
+  latest.calibration = *progress.estimate;
+  MatchNoise noise;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    recent_.CopyTo(kRecentFramesS, &latest);
+    noise = noise_.value_or(MatchNoise::kBothImages);
+  }
+  total_.Renew(latest, noise, progress);
+}
+
+void Calibrator::Worker::Publish(const OnlineCalibration::Progress& of_noise) {
+  RenewTotal(of_noise);
+  OnlineCalibration::Progress progress = of_noise;
+  total_.AddTo(&progress);
   auto next = std::make_shared<Snapshot>(MakeSnapshot(progress, options_));
+  next->doubt = total_.doubt();
   if (clock_.report()) next->gyro_stamps = DescribeStamps(*clock_.report());
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -18,6 +18,7 @@
 #include "camgyro/calibrator.h"
 #include "camgyro/online_calibration.h"
 #include "camgyro/recent_window.h"
+#include "camgyro/total_error.h"
 #include "core/calibration.h"
 #include "core/recording.h"
 #include "frontend/streaming_clock.h"
@@ -56,7 +57,8 @@ class Calibrator::Worker {
   void TakeAndProcess(std::unique_lock<std::mutex>* lock);
   std::vector<GyroSample> TakeGyro(const std::vector<GyroSample>& recorded);
   void Process(const std::vector<GyroSample>& recorded, FrameIn* frame, MatchNoise noise);
-  void Publish(const OnlineCalibration::Progress& progress);
+  void RenewTotal(const OnlineCalibration::Progress& progress);
+  void Publish(const OnlineCalibration::Progress& of_noise);
   void Stop(const std::string& message) noexcept;
 
   const CalibratorOptions options_;
@@ -81,6 +83,7 @@ class Calibrator::Worker {
   TrackCleaner cleaner_;
   StreamingClock clock_;
   std::optional<OnlineCalibration> online_;
+  TotalError total_;
   std::deque<GyroSample> early_gyro_;  // before the first frame
   std::thread thread_;                 // last: starts when all else is there
 };

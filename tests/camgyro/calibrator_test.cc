@@ -56,6 +56,15 @@ TEST(Calibrator, FindsTheTruthAndSaysWhenItIsReady) {
     EXPECT_DOUBLE_EQ(p[static_cast<size_t>(i)].sigma,
                      std::sqrt(c.covariance[static_cast<size_t>(i * kParameters + i)]));
   }
+  // The total is known, and larger: some of what a phone may have lies in the data's blind spot.
+  EXPECT_TRUE(snapshot->doubt.empty()) << snapshot->doubt;
+  for (int i = 0; i < kParameters; ++i) {
+    const ParameterState& state = p[static_cast<size_t>(i)];
+    EXPECT_GT(state.sigma_total, state.sigma) << ParameterName(i);
+    EXPECT_LT(state.sigma_total, state.wanted_sigma) << ParameterName(i);
+    EXPECT_DOUBLE_EQ(state.sigma_total,
+                     std::sqrt(c.total_covariance[static_cast<size_t>(i * kParameters + i)]));
+  }
   EXPECT_EQ(p[kDelay].readiness, Readiness::kReady) << ToString(p[kDelay].readiness);
   EXPECT_EQ(p[kFocal].readiness, Readiness::kReady) << ToString(p[kFocal].readiness);
   EXPECT_TRUE(snapshot->ready);
@@ -109,6 +118,28 @@ TEST(Calibrator, WrongAskedPrecisionIsNotReady) {
   ASSERT_TRUE(snapshot->has_estimate);
   EXPECT_FALSE(snapshot->ready);
   EXPECT_EQ(snapshot->parameters[kDelay].readiness, Readiness::kImprecise);
+}
+
+// A lens that bends by 4 px in the corners, and nobody has said so: f is off by far more than
+// noise, and neither is it called ready.
+TEST(Calibrator, WhatNobodyDeclaredIsNotReadyAndDoubted) {
+  Scenario scenario = LivelyScenario(9.0);
+  scenario.effects.radial_distortion.k1 = -0.06;
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  CalibratorOptions options = OptionsFor(scenario);
+  options.ready_focal = 0.005;
+  const auto calibrator = Make(options);
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  EXPECT_THAT(snapshot->doubt, testing::HasSubstr("the model lacks"));
+  const ParameterState& focal = snapshot->parameters[kFocal];
+  const double error_px = std::abs(snapshot->calibration.focal_px - s.truth.lens[camgyro::kFocal]);
+  EXPECT_GT(error_px, 5.0 * focal.sigma);
+  EXPECT_LT(error_px, 3.0 * focal.sigma_total);
+  EXPECT_EQ(focal.readiness, Readiness::kImprecise);
+  EXPECT_FALSE(snapshot->ready);
 }
 
 TEST(Calibrator, WithoutMotionItSaysWhy) {

@@ -1,0 +1,50 @@
+#include "camgyro/total_error.h"
+
+#include <cmath>
+
+#include "core/time.h"
+#include "estimator/calibrate.h"
+#include "estimator/diagnosis/model_check.h"
+
+namespace camgyro::api {
+
+bool TotalError::Due(std::int64_t frame_stamp_ns) const {
+  return !checked_ns_ || SecondsSince(*checked_ns_, frame_stamp_ns) >= kBetweenChecksS;
+}
+
+void TotalError::Renew(const VinsInput& latest, MatchNoise noise,
+                       const OnlineCalibration::Progress& progress) {
+  checked_ns_ = progress.frame_stamp_ns;
+  Recording recording;
+  recording.camera = camera_;
+  recording.match_noise = noise;
+  for (const std::int64_t stamp_ns : latest.frame_stamps_ns) {
+    recording.frames.emplace_back().stamp_ns = stamp_ns;
+  }
+  recording.tracks = latest.tracks;
+  recording.gyro = latest.gyro;
+  recording.accel = latest.accel;
+  if (recording.frames.size() < 2 || recording.gyro.size() < 2) return;
+
+  CalibrationReport report;
+  report.calibration = *progress.estimate;
+  report.prior = {*progress.estimate, progress.prior_sigma};
+  report.start.delay_middle_row_s = report.calibration.delay_s + 0.5 * report.calibration.readout_s;
+  report.quality.noise_px = progress.noise_px;
+  doubt_ = CheckModel(recording, {}, device_, &report).value_or("");
+  const auto& total = report.calibration.total_covariance;
+  if (total && total->allFinite()) added_ = *total - report.calibration.covariance;
+}
+
+void TotalError::Forget() {
+  checked_ns_.reset();
+  added_.reset();
+  doubt_.clear();
+}
+
+void TotalError::AddTo(OnlineCalibration::Progress* progress) const {
+  if (!progress->estimate || !added_) return;
+  progress->estimate->total_covariance = StateCovariance(progress->estimate->covariance + *added_);
+}
+
+}  // namespace camgyro::api
