@@ -43,7 +43,8 @@ struct StageTime {
   double seconds = 0.0;
 };
 
-// What an effect that nobody has declared may add to the error of each parameter.
+// What an effect that nobody has declared has in the error of each parameter: if it were known, the
+// squared total sigma would be smaller by the square of this.
 struct EffectShare {
   std::string effect;
   StateVector sigma = StateVector::Zero();

@@ -175,8 +175,11 @@ void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
   Eigen::Index at = 0;
   for (const UsualColumns& effect : t.usual) {
     const auto n = static_cast<Eigen::Index>(effect.columns.size());
-    const Eigen::MatrixXd X = u.X.middleCols(at, n);
-    const StateVector variance = (X * u.C.block(at, at, n, n) * X.transpose()).diagonal();
+    // What would go if the effect were known: effects that the data confuse with it do not remain
+    // as they were.
+    const Eigen::MatrixXd XC = u.X * u.C.middleCols(at, n);
+    const StateVector variance =
+        (XC * u.C.block(at, at, n, n).ldlt().solve(XC.transpose())).diagonal();
     report->systematic.push_back({effect.effect, variance.cwiseMax(0.0).cwiseSqrt()});
     at += n;
   }

@@ -63,6 +63,10 @@ TEST(ModelCheck, ASoundDeviceGetsATotalAndNoDoubt) {
   EXPECT_GT(total[kStateFocal], 0.004 * focal);
   EXPECT_LT(total[kStateFocal], 0.02 * focal);
   EXPECT_GT(ShareOf(c.report, "gyro_scale")[kStateFocal], 0.5 * total[kStateFocal]);
+  // No effect has more than the whole, whatever the data confuse it with.
+  for (const EffectShare& share : c.report.systematic) {
+    EXPECT_TRUE((share.sigma.array() <= total.array()).all()) << share.effect;
+  }
   // A better gyro leaves less.
   CalibrationReport industrial = c.report;
   industrial.systematic.clear();
