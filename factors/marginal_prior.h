@@ -32,6 +32,7 @@ class MarginalPrior final : public ceres::CostFunction {
                 double** jacobians) const override;
 
   const Eigen::MatrixXd& sqrt_information() const { return sqrt_information_; }
+  const Eigen::VectorXd& offset() const { return offset_; }
   const std::vector<Block>& blocks() const { return blocks_; }
 
  private:

@@ -31,6 +31,18 @@ struct PreintegrationMeasurement {
 };
 std::unique_ptr<ceres::CostFunction> MakePreintegration(const PreintegrationMeasurement& m);
 
+// The same with both biases as parameters of state i, for windows in which they walk: in the place
+// of bias_accel and calibration it takes
+//             bias_gyro 3 [rad/s], bias_accel 3 [m/s^2]    gyro frame
+struct BiasedPreintegrationMeasurement {
+  PreintegrationMeasurement preintegration;
+  // What was taken out when the delta was made.
+  Eigen::Vector3d bias_gyro_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bias_accel_m_s2 = Eigen::Vector3d::Zero();
+};
+std::unique_ptr<ceres::CostFunction> MakePreintegrationWithBias(
+    const BiasedPreintegrationMeasurement& m);
+
 }  // namespace camgyro
 
 #endif  // CAMGYRO_FACTORS_PREINTEGRATION_H_

@@ -1,55 +1,132 @@
 #include "factors/row_projection.h"
 
-#include <ceres/autodiff_cost_function.h>
+#include <ceres/sized_cost_function.h>
 #include <glog/logging.h>
 
 #include <Eigen/LU>
 
 #include "core/calibration.h"
 #include "core/so3.h"
+#include "factors/rotation_manifold.h"
 
 namespace camgyro {
 namespace {
 
-class RowProjection {
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Matrix23d = Eigen::Matrix<double, 2, 3>;
+
+constexpr double kLeastDepth = 1e-6;  // of a point of unit norm
+
+enum Block { kQ, kP, kV, kGravity, kArm, kCalibration, kPoint };
+
+template <int Columns>
+using JacobianMap =
+    Eigen::Map<Eigen::Matrix<double, 2, Columns, Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
+
+class RowProjection final
+    : public ceres::SizedCostFunction<2, 4, 3, 3 /* node */, 3 /* gravity */, 3 /* p_gyro_cam */,
+                                      kStateSize, 4 /* point */> {
  public:
   explicit RowProjection(const RowProjectionMeasurement& m)
       : m_(m), px_per_ray_(m.ray.J_ray_px.topRows<2>().inverse() / m.sigma_px) {
     CHECK_GT(m.sigma_px, 0.0);
   }
 
-  template <typename T>
-  bool operator()(const T* q, const T* p, const T* v, const T* gravity, const T* arm,
-                  const T* calibration, const T* point, T* residual) const {
-    using Vector3 = Eigen::Matrix<T, 3, 1>;
-    using Vector2 = Eigen::Matrix<T, 2, 1>;
-    using Quaternion = Eigen::Quaternion<T>;
-    const Eigen::Map<const Quaternion> Q(q);
-    const Eigen::Map<const Vector3> P(p), V(v), up(gravity), p_gyro_cam(arm), X(point),
-        db_g(calibration + kStateBias), dq(calibration + kStateRotation);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const Eigen::Map<const Vector3d> P(parameters[kP]), V(parameters[kV]),
+        gravity(parameters[kGravity]), arm(parameters[kArm]), X(parameters[kPoint]),
+        db_g(parameters[kCalibration] + kStateBias), dq(parameters[kCalibration] + kStateRotation);
+    const double* calibration = parameters[kCalibration];
+    const double w = parameters[kPoint][3];
     const ImuDelta& d = m_.node_to_row;
-    const T dt = calibration[kStateDelay] + calibration[kStateReadout] * T(m_.row_fraction);
-    const T span(d.dt_s);
-    const Vector3 g = up * T(m_.gravity_m_s2);
-    const Quaternion q_w_gyro = Q * (d.q_i_j.cast<T>() * Exp(Vector3(d.J_rot_bias_gyro * db_g)) *
-                                     Exp(Vector3(m_.omega_gyro_rad_s.cast<T>() * dt)));
-    const Vector3 velocity = V + g * span + Q * Vector3(d.dv.cast<T>());
-    const Vector3 position =
-        P + V * span + g * (T(0.5) * span * span) + Q * Vector3(d.dp.cast<T>()) + velocity * dt;
-    const Vector3 seen_gyro =
-        q_w_gyro.conjugate() * Vector3(X - point[3] * position) - point[3] * p_gyro_cam;
-    const Vector3 seen = (m_.q_gyro_cam.cast<T>() * Exp(Vector3(dq))).conjugate() * seen_gyro;
-    if (!(seen.z() > T(1e-6))) return false;  // of a unit norm
-    Vector2 ray = m_.ray.ray.head<2>().cast<T>();
-    ray += m_.ray.J_ray_lens.col(kFocal).head<2>() * calibration[kStateFocal] +
-           m_.ray.J_ray_lens.col(kCx).head<2>() * calibration[kStateCx] +
-           m_.ray.J_ray_lens.col(kCy).head<2>() * calibration[kStateCy];
-    Eigen::Map<Vector2> r(residual);
-    r = px_per_ray_ * Vector2(ray - seen.template head<2>() / seen.z());
+    const double dt = calibration[kStateDelay] + calibration[kStateReadout] * m_.row_fraction;
+    Row row;
+    row.R_w_node = Quaterniond(Eigen::Map<const Quaterniond>(parameters[kQ])).toRotationMatrix();
+    const Vector3d turn_by_bias = d.J_rot_bias_gyro * db_g;
+    row.R_row_shifted = Exp(Vector3d(m_.omega_gyro_rad_s * dt)).toRotationMatrix();
+    row.R_node_row = (d.q_i_j * Exp(turn_by_bias)).toRotationMatrix() * row.R_row_shifted;
+    const Matrix3d R_row_w = (row.R_w_node * row.R_node_row).transpose();
+    const Vector3d g = gravity * m_.gravity_m_s2;
+    row.velocity = V + g * d.dt_s + row.R_w_node * d.dv;
+    row.position =
+        P + V * d.dt_s + g * (0.5 * d.dt_s * d.dt_s) + row.R_w_node * d.dp + row.velocity * dt;
+    row.y = X - w * row.position;
+    row.u = R_row_w * row.y;
+    const Matrix3d R_cam_gyro = (m_.q_gyro_cam * Exp(Vector3d(dq))).toRotationMatrix().transpose();
+    row.seen = R_cam_gyro * (row.u - w * arm);
+    const double z = row.seen.z();
+    if (!(z > kLeastDepth)) return false;
+    const Vector2d ray = m_.ray.ray.head<2>() +
+                         m_.ray.J_ray_lens.col(kFocal).head<2>() * calibration[kStateFocal] +
+                         m_.ray.J_ray_lens.col(kCx).head<2>() * calibration[kStateCx] +
+                         m_.ray.J_ray_lens.col(kCy).head<2>() * calibration[kStateCy];
+    Eigen::Map<Vector2d> r(residuals);
+    r = px_per_ray_ * (ray - row.seen.head<2>() / z);
+    if (jacobians == nullptr) return true;
+
+    Matrix23d by_seen;
+    by_seen << 1.0 / z, 0.0, -row.seen.x() / (z * z), 0.0, 1.0 / z, -row.seen.y() / (z * z);
+    by_seen = -px_per_ray_ * by_seen;
+    FillJacobians(row, Matrix23d(by_seen * R_cam_gyro), by_seen, R_row_w, turn_by_bias, dt, w, dq,
+                  arm, parameters, jacobians);
     return true;
   }
 
  private:
+  // What the residual is made of, world frame unless named otherwise.
+  struct Row {
+    Matrix3d R_w_node, R_node_row, R_row_shifted;
+    Vector3d velocity, position;  // of the gyro frame at the row
+    Vector3d y;                   // from the gyro frame to the point, times w
+    Vector3d u;                   // the same in the gyro frame at the row
+    Vector3d seen;                // camera frame
+  };
+
+  // by_u, by_seen: derivatives of the residual by row.u and row.seen.
+  void FillJacobians(const Row& row, const Matrix23d& by_u, const Matrix23d& by_seen,
+                     const Matrix3d& R_row_w, const Vector3d& turn_by_bias, double dt, double w,
+                     const Vector3d& dq, const Vector3d& arm, double const* const* parameters,
+                     double** jacobians) const {
+    const ImuDelta& d = m_.node_to_row;
+    const Matrix23d by_y = by_u * R_row_w;
+    if (jacobians[kQ] != nullptr) {
+      const Vector3d lever = row.R_w_node.transpose() * row.y + w * (d.dp + d.dv * dt);
+      const Matrix23d by_tangent = by_u * row.R_node_row.transpose() * Hat(lever);
+      JacobianMap<4> J(jacobians[kQ]);
+      for (int i = 0; i < 2; ++i) {
+        J.row(i) = RotationManifold::Lift(by_tangent.row(i), parameters[kQ]);
+      }
+    }
+    const double span_s = d.dt_s;
+    if (jacobians[kP] != nullptr) JacobianMap<3>{jacobians[kP]} = -w * by_y;
+    if (jacobians[kV] != nullptr) JacobianMap<3>{jacobians[kV]} = -w * (span_s + dt) * by_y;
+    if (jacobians[kGravity] != nullptr) {
+      JacobianMap<3>{jacobians[kGravity]} =
+          -w * m_.gravity_m_s2 * (0.5 * span_s * span_s + span_s * dt) * by_y;
+    }
+    if (jacobians[kArm] != nullptr) JacobianMap<3>{jacobians[kArm]} = -w * by_u;
+    if (jacobians[kPoint] != nullptr) {
+      JacobianMap<4> J(jacobians[kPoint]);
+      J.leftCols<3>() = by_y;
+      J.col(3) = -by_y * row.position - by_u * arm;
+    }
+    if (jacobians[kCalibration] == nullptr) return;
+    JacobianMap<kStateSize> J(jacobians[kCalibration]);
+    J.col(kStateFocal) = px_per_ray_ * m_.ray.J_ray_lens.col(kFocal).head<2>();
+    J.col(kStateCx) = px_per_ray_ * m_.ray.J_ray_lens.col(kCx).head<2>();
+    J.col(kStateCy) = px_per_ray_ * m_.ray.J_ray_lens.col(kCy).head<2>();
+    const Matrix23d by_turn = by_u * Hat(row.u);  // right perturbation of the gyro frame
+    J.col(kStateDelay) = by_turn * m_.omega_gyro_rad_s - w * by_y * row.velocity;
+    J.col(kStateReadout) = m_.row_fraction * J.col(kStateDelay);
+    J.middleCols<3>(kStateBias) =
+        by_turn * row.R_row_shifted.transpose() * RightJacobian(turn_by_bias) * d.J_rot_bias_gyro;
+    J.middleCols<3>(kStateRotation) = by_seen * Hat(row.seen) * RightJacobian(dq);
+  }
+
   const RowProjectionMeasurement m_;
   const Eigen::Matrix2d px_per_ray_;
 };
@@ -57,10 +134,7 @@ class RowProjection {
 }  // namespace
 
 std::unique_ptr<ceres::CostFunction> MakeRowProjection(const RowProjectionMeasurement& m) {
-  return std::make_unique<
-      ceres::AutoDiffCostFunction<RowProjection, 2 /* residual */, 4, 3, 3 /* node */,
-                                  3 /* gravity */, 3 /* p_gyro_cam */, kStateSize, 4 /* point */>>(
-      new RowProjection(m));
+  return std::make_unique<RowProjection>(m);
 }
 
 }  // namespace camgyro

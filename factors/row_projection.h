@@ -26,7 +26,8 @@ namespace camgyro {
 //                               made with, in the order of StateIndex
 //             point 4           homogeneous (X, w), unit norm: points at any distance (w < 0: seen
 //                                beyond infinity, as noise may have it)
-// Residual    2, in sigmas
+// Residual    2, in sigmas. The derivatives are analytic: it is evaluated more often than any
+//             other factor of the odometry
 // Valid       for points before the camera (else the evaluation fails); |T| below 0.1 s, since the
 //             accelerometer's bias is neglected in between (1e-3 m at 0.2 m/s^2)
 struct RowProjectionMeasurement {

@@ -5,6 +5,7 @@
 #include <ceres/cost_function.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "factors/rotation_manifold.h"
@@ -13,9 +14,10 @@ namespace camgyro {
 
 // Compares every column with differences of step `step` (times 1 + |value|), to 1e-4 of the largest
 // entry of its block. (ceres::GradientChecker compares entry by entry, and takes the rounding noise
-// of an entry that is zero for an error.) Blocks of 4 numbers are rotations.
+// of an entry that is zero for an error.) Blocks of 4 numbers are rotations, but for `points`.
 inline void ExpectJacobiansMatchDifferences(const ceres::CostFunction& factor,
-                                            const std::vector<double*>& parameters, double step) {
+                                            const std::vector<double*>& parameters, double step,
+                                            const std::vector<const double*>& points = {}) {
   const int rows = factor.num_residuals();
   const auto& sizes = factor.parameter_block_sizes();
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -29,7 +31,8 @@ inline void ExpectJacobiansMatchDifferences(const ceres::CostFunction& factor,
   EXPECT_EQ(r, plus) << "residuals differ with and without Jacobians";
   RotationManifold rotation;
   for (size_t k = 0; k < sizes.size(); ++k) {
-    const bool is_rotation = sizes[k] == 4;
+    const bool is_rotation =
+        sizes[k] == 4 && std::find(points.begin(), points.end(), parameters[k]) == points.end();
     const int tangent = is_rotation ? 3 : sizes[k];
     Eigen::MatrixXd analytic = jacobians[k];
     if (is_rotation) analytic = analytic * RotationManifold::PlusJacobianOf(parameters[k]);

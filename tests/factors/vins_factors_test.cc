@@ -8,6 +8,7 @@
 #include "core/so3.h"
 #include "factors/preintegration.h"
 #include "factors/row_projection.h"
+#include "tests/factors/difference_check.h"
 
 namespace camgyro {
 namespace {
@@ -82,6 +83,27 @@ TEST(Preintegration, CorrelatedNoiseIsWhitened) {
   s.j.p += s.i.q * Vector3d(0.01, 0, 0);
   // e' C^-1 e of (1, 1) sigma with correlation 0.6: 2 (1 - 0.6) / (1 - 0.36).
   EXPECT_NEAR(s.Residual().squaredNorm(), 0.8 / 0.64, 1e-9);
+}
+
+TEST(Preintegration, BiasesOfAStateAreThoseThatWereNotTakenOut) {
+  Scene s;
+  BiasedPreintegrationMeasurement m;
+  m.preintegration = s.m;
+  m.bias_gyro_rad_s = {0.01, -0.02, 0.03};
+  m.bias_accel_m_s2 = {0.3, 0.2, -0.1};
+  Vector3d bias_gyro = m.bias_gyro_rad_s + s.calibration.segment<3>(kStateBias);
+  Vector3d bias_accel = m.bias_accel_m_s2 + s.bias_accel;
+  const auto factor = MakePreintegrationWithBias(m);
+  const std::vector<double*> parameters = {
+      s.i.q.coeffs().data(), s.i.p.data(), s.i.v.data(),     s.j.q.coeffs().data(), s.j.p.data(),
+      s.j.v.data(),          s.up.data(),  bias_gyro.data(), bias_accel.data()};
+  Eigen::VectorXd r(9);
+  ASSERT_TRUE(factor->Evaluate(parameters.data(), r.data(), nullptr));
+  EXPECT_LT(r.norm(), 1e-9);
+  bias_accel.x() += 0.1;  // 0.2 s of it: 0.02 m/s, one sigma, and 0.002 m, a fifth of one
+  ASSERT_TRUE(factor->Evaluate(parameters.data(), r.data(), nullptr));
+  EXPECT_NEAR(r[3], 1.0, 1e-9);
+  EXPECT_NEAR(r[6], 0.2, 1e-9);
 }
 
 // A point seen by a row 12 ms after the node, through a lens with distortion.
@@ -183,6 +205,18 @@ TEST(RowProjection, LensAndMountingMoveTheRay) {
   ASSERT_TRUE(GetLens(DistortionModel::kRadTan).Unproject(f.px, moved, &ray));
   f.point << f.CameraAt(0.0) * Vector3d(4.0 * ray.ray), 1.0;
   EXPECT_LT(f.Residual().norm(), 5e-3);  // second order of 1 px in 500
+}
+
+TEST(RowProjection, DerivativesAreThoseOfTheResidual) {
+  Sight s;
+  s.calibration << 1.5, -2.0, 1.0, 2e-3, -3e-3, 0.02, -0.03, 0.01, 0.02, -0.01, 0.03;
+  s.node.p += Vector3d(0.02, -0.03, 0.01);
+  Eigen::Vector4d point = s.point.normalized();
+  const auto factor = MakeRowProjection(s.m);
+  ExpectJacobiansMatchDifferences(*factor,
+                                  {s.node.q.coeffs().data(), s.node.p.data(), s.node.v.data(),
+                                   s.up.data(), s.arm.data(), s.calibration.data(), point.data()},
+                                  1e-6, {point.data()});
 }
 
 TEST(RowProjection, PointsBehindTheCameraAreRefused) {
