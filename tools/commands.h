@@ -21,6 +21,7 @@ namespace camgyro {
   ROW(Export)                 \
   ROW(Stabilize)              \
   ROW(Rectify)                \
+  ROW(Odometry)               \
   ROW(Help)
 
 #define CAMGYRO_DECLARE(name) Command name##Command();

@@ -355,9 +355,9 @@ ReportSection ReproductionSection(const RunInfo& run) {
       "\noptions    ";
   for (const auto& [name, value] : run.options) text += " --" + name + "=" + value;
   return {"reproduction", "To reproduce this",
-          "<pre>" + EscapeHtml(text) + "</pre>\n" +
-              "<details><summary>calibration.yaml</summary><pre>" +
-              EscapeHtml(run.calibration_yaml) + "</pre></details>\n"};
+          "<pre>" + EscapeHtml(text) + "</pre>\n" + "<details><summary>" +
+              EscapeHtml(run.result_name) + "</summary><pre>" + EscapeHtml(run.result_yaml) +
+              "</pre></details>\n"};
 }
 
 }  // namespace camgyro

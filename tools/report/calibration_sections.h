@@ -37,7 +37,8 @@ struct RunInfo {
   std::string command_line;
   std::string recording;  // what it holds, in one line
   std::vector<std::pair<std::string, std::string>> options;
-  std::string calibration_yaml;  // the file, word by word
+  std::string result_yaml;  // the file, word by word
+  std::string result_name = "calibration.yaml";
 };
 ReportSection ReproductionSection(const RunInfo& run);
 

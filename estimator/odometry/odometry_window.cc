@@ -1,0 +1,372 @@
+#include "estimator/odometry/odometry_window.h"
+
+#include <ceres/solver.h>
+#include <glog/logging.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/robust_statistics.h"
+#include "core/so3.h"
+#include "core/time.h"
+#include "estimator/odometry/window_program.h"
+#include "factors/bias_walk.h"
+
+namespace camgyro {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kMinParallaxRad = 0.01;
+// Of a direction from a point that is triangulated with states as they were predicted.
+constexpr double kMaxTriangulationErrorRad = 0.02;
+constexpr double kOutlierSigmas = 4.0;
+constexpr double kLeastNoisePx = 1e-3;
+// Of each solve's estimate of the noise in what later sightings are weighted with.
+constexpr double kNoiseUpdate = 0.2;
+constexpr int kMinResidualsForNoise = 30;
+constexpr double kRecentreM = 5.0;
+// Of yaw [rad] and position [m] of the first keyframe, which are the frame of all others: far below
+// anything that pictures tell.
+constexpr double kFrameSigma = 1e-5;
+// Of what is taken as exactly known: f, c [px], t_r, t_d [s], b_g [rad/s], q_c [rad]; far below
+// anything that matters.
+StateVector LeastSigma() {
+  StateVector least;
+  least << 1e-2, 1e-2, 1e-2, 1e-6, 1e-6, Vector3d::Constant(1e-7), Vector3d::Constant(1e-6);
+  return least;
+}
+
+// The root of an inverse covariance; its diagonal may span orders of magnitude.
+MatrixXd InverseRoot(const MatrixXd& covariance) {
+  const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  MatrixXd root = MatrixXd::Identity(covariance.rows(), covariance.cols());
+  const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * covariance * scale.asDiagonal());
+  llt.matrixL().solveInPlace(root);
+  return root * scale.asDiagonal();
+}
+
+}  // namespace
+
+OdometryWindow::OdometryWindow(const Calibration& calibration, const OdometryWindowOptions& options)
+    : options_(options), q_gyro_cam_(calibration.q_gyro_cam) {}
+
+OdometryWindow::~OdometryWindow() = default;
+
+void OdometryWindow::SetPrior(std::vector<double*> blocks, MatrixXd S, VectorXd r) {
+  std::vector<MarginalPrior::Block> linearised;
+  for (double* block : blocks) {
+    const bool is_rotation = std::any_of(keyframes_.begin(), keyframes_.end(),
+                                         [&](OdometryNode& k) { return k.q() == block; });
+    const int size = is_rotation ? 4 : block == calibration_.data() ? int{kStateSize} : 3;
+    linearised.push_back({Eigen::Map<VectorXd>(block, size), is_rotation});
+  }
+  prior_ = std::make_unique<MarginalPrior>(std::move(linearised), std::move(S), std::move(r));
+  prior_blocks_ = std::move(blocks);
+}
+
+void OdometryWindow::AddFirst(NewKeyframe keyframe, const WindowPrior& prior) {
+  CHECK(keyframes_.empty());
+  origin_m_ = keyframe.state.p_world_m;
+  arm_ = prior.p_gyro_cam_m;
+  OdometryNode& first = keyframes_.emplace_back();
+  first.frame_stamp_ns = keyframe.frame_stamp_ns;
+  first.time_ns = keyframe.time_ns;
+  first.state = keyframe.state;
+  first.state.p_world_m.setZero();
+
+  // Columns: q, p, b_g, b_a, calibration, p_gyro_cam; rows: yaw and p, then as the columns.
+  MatrixXd S = MatrixXd::Zero(4 + 6 + kStateSize + 3, 12 + kStateSize + 3);
+  Eigen::Matrix<double, 4, 6> yaw_position = Eigen::Matrix<double, 4, 6>::Zero();
+  yaw_position.block<1, 3>(0, 0) = first.state.q_world_gyro.toRotationMatrix().row(2);
+  yaw_position.block<3, 3>(1, 3).setIdentity();
+  S.topLeftCorner<4, 6>() = yaw_position / kFrameSigma;
+  S.block<3, 3>(4, 6) = prior.bias_gyro_sigma_rad_s.cwiseInverse().asDiagonal();
+  S.block<3, 3>(7, 9) = Matrix3d::Identity() / prior.bias_accel_sigma_m_s2;
+  StateCovariance calibration = prior.calibration_covariance;
+  calibration.middleRows<3>(kStateBias).setZero();
+  calibration.middleCols<3>(kStateBias).setZero();
+  calibration.diagonal() += LeastSigma().cwiseAbs2();
+  S.block<kStateSize, kStateSize>(10, 12) = InverseRoot(calibration);
+  S.bottomRightCorner<3, 3>() = Matrix3d::Identity() / prior.p_gyro_cam_sigma_m;
+  VectorXd r = VectorXd::Zero(S.rows());
+  r.segment<3>(7) = first.state.bias_accel_m_s2 / prior.bias_accel_sigma_m_s2;
+  SetPrior({first.q(), first.p(), first.bias_gyro(), first.bias_accel(), calibration_.data(),
+            arm_.data()},
+           std::move(S), std::move(r));
+  AddSightings(&keyframe);
+}
+
+void OdometryWindow::Add(NewKeyframe keyframe) {
+  CHECK(!keyframes_.empty() && keyframe.link.has_value());
+  const double span_s = SecondsSince(keyframes_.back().time_ns, keyframe.time_ns);
+  OdometryNode& added = keyframes_.emplace_back();
+  added.frame_stamp_ns = keyframe.frame_stamp_ns;
+  added.time_ns = keyframe.time_ns;
+  added.state = keyframe.state;
+  added.state.p_world_m -= origin_m_;
+  added.inertial = MakePreintegrationWithBias(*keyframe.link);
+  added.gyro_walk = std::make_unique<BiasWalk>(options_.walk.gyro_rad_s2_rtHz, span_s);
+  added.accel_walk = std::make_unique<BiasWalk>(options_.walk.accel_m_s3_rtHz, span_s);
+  AddSightings(&keyframe);
+}
+
+void OdometryWindow::AddSightings(NewKeyframe* keyframe) {
+  for (LandmarkSighting& seen : keyframe->sightings) {
+    OdometrySighting sighting;
+    sighting.keyframe = &keyframes_.back();
+    sighting.factor = MakeRowProjection(seen.projection);
+    sighting.measurement = std::move(seen.projection);
+    landmarks_[seen.track_id].sightings.push_back(std::move(sighting));
+  }
+}
+
+void OdometryWindow::RemoveNewest() {
+  CHECK_GT(keyframes_.size(), 1u);
+  const OdometryNode* newest = &keyframes_.back();
+  for (auto it = landmarks_.begin(); it != landmarks_.end();) {
+    std::vector<OdometrySighting>& sightings = it->second.sightings;
+    if (!sightings.empty() && sightings.back().keyframe == newest) sightings.pop_back();
+    it = sightings.empty() ? landmarks_.erase(it) : std::next(it);
+  }
+  keyframes_.pop_back();
+}
+
+ViewingLine OdometryWindow::LineOf(const OdometrySighting& sighting) const {
+  const NavigationState& s = sighting.keyframe->state;
+  const RowProjectionMeasurement& m = sighting.measurement;
+  const NavigationState row = Predict(s, m.node_to_row, options_.gravity_m_s2);
+  const Eigen::Quaterniond q_gyro_cam =
+      q_gyro_cam_ * Exp(Vector3d(calibration_.segment<3>(kStateRotation)));
+  return {row.p_world_m + row.q_world_gyro * arm_,
+          (row.q_world_gyro * (q_gyro_cam * m.ray.ray)).normalized()};
+}
+
+// Before the camera, where the projection can be evaluated at all.
+bool OdometryWindow::Believable(const OdometryLandmark& landmark,
+                                const OdometrySighting& sighting) const {
+  const ViewingLine line = LineOf(sighting);
+  const Vector3d seen = landmark.point.head<3>() - landmark.point[3] * line.centre_m;
+  return seen.dot(line.direction) > 1e-3 * seen.norm() && seen.norm() > 1e-4;
+}
+
+void OdometryWindow::TriangulateNew() {
+  for (auto& [track_id, landmark] : landmarks_) {
+    if (landmark.known()) {
+      auto& sightings = landmark.sightings;
+      sightings.erase(
+          std::remove_if(sightings.begin(), sightings.end(),
+                         [&](const OdometrySighting& s) { return !Believable(landmark, s); }),
+          sightings.end());
+      continue;
+    }
+    std::vector<ViewingLine> lines;
+    for (const OdometrySighting& sighting : landmark.sightings) lines.push_back(LineOf(sighting));
+    if (const auto point = Triangulate(lines, kMinParallaxRad, kMaxTriangulationErrorRad)) {
+      landmark.point << *point, 1.0;
+      landmark.point.normalize();
+    }
+  }
+}
+
+Status OdometryWindow::Solve(int max_iterations) {
+  Recentre();
+  TriangulateNew();
+  Program program(this);
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.max_num_iterations = max_iterations;
+  options.function_tolerance = 1e-4;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  // No ordering of our own: Ceres would sort its blocks by their addresses, and the result would
+  // depend on those in its last digits.
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &program.problem(), &summary);
+  if (!summary.IsSolutionUsable()) return CannotEstimate("the odometry's window has no solution");
+  DropOutliersAndUpdateNoise(program);
+  return {};
+}
+
+void OdometryWindow::DropOutliersAndUpdateNoise(const Program& program) {
+  std::vector<double> norms_px;
+  int newest = 0, newest_inliers = 0, points = 0;
+  for (auto& [track_id, landmark] : landmarks_) {
+    if (!landmark.used()) continue;
+    ++points;
+    const auto& ids = program.SightingsOf(track_id);
+    std::vector<OdometrySighting> kept;
+    for (size_t i = 0; i < ids.size(); ++i) {
+      OdometrySighting& sighting = landmark.sightings[i];
+      Eigen::Vector2d residual;
+      const bool evaluated = program.problem().EvaluateResidualBlock(
+          ids[i], /*apply_loss_function=*/false, nullptr, residual.data(), nullptr);
+      const bool inlier = evaluated && residual.norm() < kOutlierSigmas;
+      if (evaluated) norms_px.push_back(residual.norm() * sighting.measurement.sigma_px);
+      if (sighting.keyframe == &keyframes_.back()) {
+        ++newest;
+        newest_inliers += inlier;
+      }
+      if (inlier) kept.push_back(std::move(sighting));
+    }
+    landmark.sightings = std::move(kept);
+  }
+  known_sightings_ = newest;
+  inlier_ratio_ = newest > 0 ? static_cast<double>(newest_inliers) / newest : 0.0;
+  if (norms_px.size() < kMinResidualsForNoise) return;
+  // A landmark takes 3 of its residuals' degrees of freedom, a keyframe about 6.
+  const double all = 2.0 * static_cast<double>(norms_px.size());
+  const double taken = 3.0 * points + 6.0 * static_cast<double>(keyframes_.size());
+  // The median length of a unit normal vector in the plane is 1.177.
+  const double found_px =
+      MedianInPlace(&norms_px) / 1.177 / std::sqrt(std::max(0.1, 1.0 - taken / all));
+  noise_px_ = std::max(kLeastNoisePx, (1.0 - kNoiseUpdate) * noise_px_ + kNoiseUpdate * found_px);
+}
+
+Result<WindowKeyframe> OdometryWindow::MarginaliseOldest() {
+  CHECK_GT(keyframes_.size(), 2u);
+  const WindowKeyframe leaving = keyframe(0);
+  OdometryNode& oldest = keyframes_.front();
+  const int64_t half_ns = keyframes_[keyframes_.size() / 2].time_ns;
+
+  ReducedInformation information;
+  Program::AddKeyframe(&oldest, &information);
+  const int leading = information.size();
+  Program program(this);
+  std::vector<double*> staying;
+  for (size_t k = 1; k <= keyframes_.size() / 2; ++k) {
+    OdometryNode& other = keyframes_[k];
+    Program::AddKeyframe(&other, &information);
+    for (double* block : {other.q(), other.p(), other.v(), other.bias_gyro(), other.bias_accel()}) {
+      staying.push_back(block);
+    }
+  }
+  program.AddShared(&information);
+  staying.push_back(calibration_.data());
+  staying.push_back(arm_.data());
+
+  const tl::unexpected<Error> failed = CannotEstimate("a keyframe cannot be marginalised");
+  if (!information.Add(program.problem(), program.prior())) return failed;
+  for (const ceres::ResidualBlockId id : program.LinksOf(1)) {
+    if (!information.Add(program.problem(), id)) return failed;
+  }
+  for (auto it = landmarks_.begin(); it != landmarks_.end();) {
+    OdometryLandmark& landmark = it->second;
+    if (!landmark.sightings.empty() && landmark.sightings.front().keyframe == &oldest) {
+      const auto newer =
+          std::find_if(landmark.sightings.begin(), landmark.sightings.end(),
+                       [&](const OdometrySighting& s) { return s.keyframe->time_ns >= half_ns; });
+      const auto older = static_cast<size_t>(newer - landmark.sightings.begin());
+      if (landmark.used() && older >= 2) {
+        std::vector<ceres::ResidualBlockId> ids = program.SightingsOf(it->first);
+        ids.resize(older);
+        if (!information.AddWithout(program.problem(), ids, landmark.point.data(), 3)) {
+          return failed;
+        }
+        landmark.sightings.erase(landmark.sightings.begin(), newer);
+      } else {  // One sighting of a point that has to be found by it as well says nothing.
+        landmark.sightings.erase(landmark.sightings.begin());
+      }
+      if (landmark.sightings.size() < 2) landmark.point.setZero();
+    }
+    it = landmark.sightings.empty() ? landmarks_.erase(it) : std::next(it);
+  }
+  const SquareRoot root = RootOf(information.Without(leading));
+  SetPrior(std::move(staying), root.S, root.r);
+  keyframes_.pop_front();
+  OdometryNode& first = keyframes_.front();
+  first.inertial.reset();
+  first.gyro_walk.reset();
+  first.accel_walk.reset();
+  return leaving;
+}
+
+// Moves the inner origin to the oldest keyframe once that is far from it.
+void OdometryWindow::Recentre() {
+  const Vector3d shift_m = keyframes_.front().state.p_world_m;
+  if (shift_m.norm() < kRecentreM) return;
+  origin_m_ += shift_m;
+  for (auto& [track_id, landmark] : landmarks_) {
+    if (!landmark.known()) continue;
+    landmark.point.head<3>() -= landmark.point[3] * shift_m;
+    landmark.point.normalize();
+  }
+  std::vector<MarginalPrior::Block> blocks = prior_->blocks();
+  for (size_t i = 0; i < blocks.size(); ++i) {
+    const bool position = std::any_of(keyframes_.begin(), keyframes_.end(),
+                                      [&](OdometryNode& k) { return k.p() == prior_blocks_[i]; });
+    if (position) blocks[i].linearization -= shift_m;
+  }
+  prior_ = std::make_unique<MarginalPrior>(std::move(blocks), prior_->sqrt_information(),
+                                           prior_->offset());
+  for (OdometryNode& k : keyframes_) k.state.p_world_m -= shift_m;
+}
+
+WindowKeyframe OdometryWindow::keyframe(size_t i) const {
+  const OdometryNode& k = keyframes_[i];
+  WindowKeyframe result{k.frame_stamp_ns, k.time_ns, k.state};
+  result.state.p_world_m += origin_m_;
+  return result;
+}
+
+bool OdometryWindow::IsMapped(int64_t track_id) const {
+  const auto found = landmarks_.find(track_id);
+  return found != landmarks_.end() && found->second.used();
+}
+
+std::vector<MappedPoint> OdometryWindow::Points() const {
+  std::vector<MappedPoint> points;
+  for (const auto& [track_id, landmark] : landmarks_) {
+    if (!landmark.used() || !(landmark.point[3] > 1e-6)) continue;
+    points.push_back({track_id, origin_m_ + landmark.point.head<3>() / landmark.point[3],
+                      static_cast<int>(landmark.sightings.size())});
+  }
+  return points;
+}
+
+Result<OdometryWindow::Covariance> OdometryWindow::ComputeCovariance(bool of_all_keyframes) {
+  Program program(this);
+  ReducedInformation information;
+  for (OdometryNode& k : keyframes_) Program::AddKeyframe(&k, &information);
+  program.AddShared(&information);
+  bool sound = information.Add(program.problem(), program.prior());
+  for (size_t k = 1; k < keyframes_.size(); ++k) {
+    for (const ceres::ResidualBlockId id : program.LinksOf(k)) {
+      sound = sound && information.Add(program.problem(), id);
+    }
+  }
+  for (auto& [track_id, landmark] : landmarks_) {
+    if (!sound || !landmark.used()) continue;
+    sound = information.AddWithout(program.problem(), program.SightingsOf(track_id),
+                                   landmark.point.data(), 3);
+  }
+  const tl::unexpected<Error> failed =
+      CannotEstimate("the odometry's window does not determine its state");
+  if (!sound) return failed;
+  const MatrixXd& H = information.All().H;
+  const VectorXd unit = H.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<MatrixXd> llt(unit.asDiagonal() * H * unit.asDiagonal());
+  if (llt.info() != Eigen::Success || !unit.allFinite()) return failed;
+  const auto block = [&](Eigen::Index first, Eigen::Index size) {
+    MatrixXd columns = MatrixXd::Zero(H.rows(), size);
+    columns.middleRows(first, size) = unit.segment(first, size).asDiagonal();
+    return MatrixXd(unit.segment(first, size).asDiagonal() *
+                    MatrixXd(llt.solve(columns)).middleRows(first, size));
+  };
+  Covariance result;
+  const Eigen::Index shared = information.ColumnOf(calibration_.data());
+  for (Eigen::Index first = 0; first < shared; first += kNavSize) {
+    const bool wanted = of_all_keyframes || first == 0 || first + kNavSize == shared;
+    if (wanted) result.states.emplace_back(block(first, kNavSize));
+  }
+  result.calibration = block(shared, kStateSize);
+  result.p_gyro_cam = block(shared + kStateSize, 3);
+  return result;
+}
+
+}  // namespace camgyro

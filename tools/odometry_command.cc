@@ -1,0 +1,182 @@
+// `camgyro odometry RECORDING [--calibration=FILE] --out=DIR`: where the device went.
+#include <gflags/gflags.h>
+
+#include <chrono>
+#include <cstdio>
+#include <sstream>
+
+#include "core/format.h"
+#include "estimator/odometry/follow_recording.h"
+#include "pipeline/frame_times_file.h"
+#include "pipeline/read_calibration.h"
+#include "pipeline/result_files.h"
+#include "pipeline/run.h"
+#include "tools/commands.h"
+#include "tools/fit_flags.h"
+#include "tools/odometry_files.h"
+#include "tools/progress_bar.h"
+#include "tools/recording_input.h"
+#include "tools/report/odometry_report.h"
+#include "tools/summary.h"
+
+DECLARE_string(calibration);
+DECLARE_string(effects);
+DECLARE_string(out);
+DECLARE_bool(quiet);
+DEFINE_int32(
+    keyframes, 16,
+    "keyframes in the sliding window, 6 to 60: more are slower and a little more accurate");
+DEFINE_double(gravity, 9.80665, "length of gravity where the recording was made [m/s^2]");
+DEFINE_string(lever_arm, "0,0,0",
+              "position of the camera in the gyro's frame, as far as it is known: x,y,z [m]");
+DEFINE_double(lever_arm_sigma, 0.05, "how well it is known, per axis [m]");
+
+namespace camgyro {
+namespace {
+
+Result<OdometryOptions> OptionsFromFlags() {
+  OdometryOptions options;
+  if (FLAGS_keyframes < 6 || FLAGS_keyframes > 60) {
+    return BadUsage("--keyframes: expected 6 to 60");
+  }
+  options.keyframes = FLAGS_keyframes;
+  if (!(FLAGS_gravity > 9.0 && FLAGS_gravity < 10.5)) {
+    return BadUsage("--gravity: expected 9 to 10.5 m/s^2");
+  }
+  options.gravity_m_s2 = FLAGS_gravity;
+  std::istringstream words(FLAGS_lever_arm);
+  char comma = ',', second = ',';
+  Eigen::Vector3d& arm = options.p_gyro_cam_m;
+  if (!(words >> arm.x() >> comma >> arm.y() >> second >> arm.z()) || comma != ',' ||
+      second != ',' || !(words >> std::ws).eof() || !arm.allFinite()) {
+    return BadUsage("--lever_arm=" + FLAGS_lever_arm + ": expected x,y,z in metres");
+  }
+  if (!(FLAGS_lever_arm_sigma > 0.0 && FLAGS_lever_arm_sigma <= 10.0)) {
+    return BadUsage("--lever_arm_sigma: expected more than 0, at most 10 m");
+  }
+  options.p_gyro_cam_sigma_m = FLAGS_lever_arm_sigma;
+  return options;
+}
+
+// That of --calibration, or the recording's own.
+Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
+  if (!FLAGS_calibration.empty()) {
+    Result<Calibration> calibration = ReadCalibration(FLAGS_calibration);
+    if (!calibration) return calibration;
+    if (Status read = ApplyFrameTimes(FLAGS_calibration, recording); !read) {
+      return tl::unexpected(read.error());
+    }
+    return calibration;
+  }
+  const Result<DeviceClass> device = DeviceFromFlag();
+  if (!device) return tl::unexpected(device.error());
+  CalibrateOptions options;
+  options.effects = FLAGS_effects;
+  Result<CalibrationRun> run = RunCalibration(
+      options, OnlineEstimator::kWindow, *device,
+      [&](const std::string& stage, double done) { bar->Show(stage, done); }, recording);
+  if (!run) return tl::unexpected(run.error());
+  return run->report.calibration;
+}
+
+std::string Summary(const OdometryRun& run, double recorded_s, double seconds) {
+  std::string text = "verdict    " + VerdictOf(run) + "\n";
+  if (run.segments > 0) {
+    const OdometryPose& last = run.poses.back();
+    const Eigen::Vector3d sigma =
+        last.covariance.block<3, 3>(kNavPosition, kNavPosition).diagonal().cwiseSqrt();
+    text += Format(
+        "path       %.2f m in %zu keyframes; the last frame at (%.2f, %.2f, %.2f) m +- %.2f %.2f "
+        "%.2f\n",
+        run.path_m, run.keyframes.size(), last.state.p_world_m.x(), last.state.p_world_m.y(),
+        last.state.p_world_m.z(), sigma.x(), sigma.y(), sigma.z());
+    text +=
+        Format("lens       %.2f px of noise; camera at (%.3f, %.3f, %.3f) m in the gyro frame\n",
+               run.noise_px, run.p_gyro_cam_m.x(), run.p_gyro_cam_m.y(), run.p_gyro_cam_m.z());
+  }
+  text += Format("time       %.1f s for %.1f s of recording\n", seconds, recorded_s);
+  return text;
+}
+
+Status RunOdometry(const std::vector<std::string>& arguments) {
+  const Result<OdometryOptions> options = OptionsFromFlags();
+  if (!options) return tl::unexpected(options.error());
+  FileSet files(FLAGS_out.empty() ? "odometry" : FLAGS_out);
+  if (Status writable = files.CheckWritable(); !writable) return writable;
+  Result<Recording> recording = OpenRecording(arguments[0]);
+  if (!recording) return tl::unexpected(recording.error());
+  if (!FLAGS_quiet) {
+    std::printf("%s: %s\n%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),
+                Notes("input", recording->notes).c_str());
+    std::fflush(stdout);
+  }
+  Result<Calibration> calibration = CannotEstimate("");
+  Result<OdometryRun> run = CannotEstimate("");
+  double seconds = 0.0;
+  {
+    ProgressBar bar;
+    const Progress progress = [&](const std::string& stage, double done) { bar.Show(stage, done); };
+    if (Result<TrackingSummary> tracked = EnsureImageMotion(progress, &*recording); !tracked) {
+      return tl::unexpected(tracked.error());
+    }
+    calibration = CalibrationOf(&*recording, &bar);
+    if (!calibration) return tl::unexpected(calibration.error());
+    const auto begin = std::chrono::steady_clock::now();
+    run =
+        FollowRecording(*recording, *calibration, WithDeclaredNoise(*options, recording->gyro_info),
+                        [&](double done) { bar.Show("odometry", done); });
+    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+  if (!run) return tl::unexpected(run.error());
+
+  const std::string yaml = OdometryYaml(*run);
+  files.Add("odometry.yaml", yaml);
+  if (run->segments > 0) {
+    files.Add("trajectory.tum", TrajectoryTum(run->poses));
+    files.Add("keyframes.tum", TrajectoryTum(run->keyframes));
+    files.Add("trajectory.csv", PosesCsv(run->poses));
+    files.Add("keyframes.csv", PosesCsv(run->keyframes));
+    files.Add("points.ply", PointsPly(run->points));
+    const Command command = OdometryCommand();
+    files.Add(
+        "report.html",
+        OdometryReportHtml(*run, {CommandLineOf(command, arguments), DescribeRecording(*recording),
+                                  FlagValues(command), yaml, "odometry.yaml"}));
+  }
+  if (Status written = files.Write(); !written) return written;
+  const double recorded_s = recording->frames.empty()
+                                ? 0.0
+                                : 1e-9 * static_cast<double>(recording->frames.back().stamp_ns -
+                                                             recording->frames.front().stamp_ns);
+  if (!FLAGS_quiet) {
+    std::printf("%swritten    %s/odometry.yaml%s\n", Summary(*run, recorded_s, seconds).c_str(),
+                files.folder().c_str(),
+                run->segments > 0 ? ", report.html, trajectory.tum, keyframes.tum, trajectory.csv, "
+                                    "keyframes.csv, points.ply"
+                                  : "");
+  }
+  if (run->segments == 0) {
+    return CannotEstimate("odometry did not start: " + run->start_explanation);
+  }
+  return {};
+}
+
+}  // namespace
+
+Command OdometryCommand() {
+  Command command;
+  command.name = "odometry";
+  command.arguments = "RECORDING";
+  command.summary =
+      "where the device went: positions, velocities and biases of a recording with an "
+      "accelerometer, by a sliding window that knows the rolling shutter and both clocks; without "
+      "--calibration the recording is calibrated first";
+  command.flags = {"calibration", "out",     "effects",   "device",
+                   "keyframes",   "gravity", "lever_arm", "lever_arm_sigma"};
+  for (const std::string& flag : InputFlags()) command.flags.push_back(flag);
+  command.flags.emplace_back("quiet");
+  command.run = RunOdometry;
+  return command;
+}
+
+}  // namespace camgyro

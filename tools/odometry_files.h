@@ -1,0 +1,30 @@
+// The files of `camgyro odometry` (docs/odometry.md).
+#ifndef CAMGYRO_TOOLS_ODOMETRY_FILES_H_
+#define CAMGYRO_TOOLS_ODOMETRY_FILES_H_
+
+#include <string>
+#include <vector>
+
+#include "estimator/odometry/follow_recording.h"
+
+namespace camgyro {
+
+// One line for people: whether it followed the device, or why not.
+std::string VerdictOf(const OdometryRun& run);
+
+// odometry.yaml: verdict, events, the calibration as refined.
+std::string OdometryYaml(const OdometryRun& run);
+
+// "time x y z qx qy qz qw" [s of the gyro's clock, m]: the gyro frame in the world, z up. The
+// format of the TUM RGB-D benchmark.
+std::string TrajectoryTum(const std::vector<OdometryPose>& poses);
+
+// Everything of the poses, one row each, with the covariance of position and rotation.
+std::string PosesCsv(const std::vector<OdometryPose>& poses);
+
+// ASCII PLY.
+std::string PointsPly(const std::vector<MappedPoint>& points);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_TOOLS_ODOMETRY_FILES_H_
