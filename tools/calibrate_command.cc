@@ -103,7 +103,8 @@ Result<Calibrated> CalibrateOne(const std::string& path, const std::string& fold
   files.Add("report.html", *html);
   if (Status written = files.Write(); !written) return tl::unexpected(written.error());
 
-  std::printf("\n%s", ParameterTable(report->calibration, attitudes).c_str());
+  std::printf("%s%s", FLAGS_quiet ? "" : "\n",
+              ParameterTable(report->calibration, attitudes).c_str());
   if (!FLAGS_quiet) {
     const std::vector<std::string> found(recording->notes.begin() + static_cast<long>(shown),
                                          recording->notes.end());
@@ -149,6 +150,8 @@ Status CalibrateDevice(const std::vector<std::string>& paths, const std::string&
   std::vector<Calibrated> all;
   std::vector<std::string> calibrated, refused;
   for (size_t i = 0; i < paths.size(); ++i) {
+    // The description that heads a recording's table otherwise is no result.
+    if (FLAGS_quiet) std::printf("%s:\n", names[i].c_str());
     Result<Calibrated> one = CalibrateOne(
         paths[i], (std::filesystem::path(folder) / names[i]).string(), options, device_class);
     if (!one && one.error().kind != ErrorKind::kCannotEstimate) {

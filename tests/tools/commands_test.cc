@@ -85,6 +85,10 @@ TEST_F(CommandsTest, CalibrateSeveralRecordingsOfOneDevice) {
   const RunResult odd = Run("calibrate a b more/a zoomed --out=device --quiet");
   ASSERT_EQ(odd.exit_code, 0) << odd.err;
   EXPECT_THAT(odd.out, HasSubstr("odd        zoomed: its focal length is"));
+  for (const char* name : {"a", "b", "a_2", "zoomed"}) {  // each table under its recording's name
+    EXPECT_THAT(odd.out, testing::ContainsRegex("(^|\n)" + std::string(name) + ":\n +value .*\n" +
+                                                "  focal length "));
+  }
   EXPECT_EQ(Run("calibrate rest more/rest --out=none").exit_code, 3);  // there is no more/rest
   EXPECT_EQ(Run("calibrate a rest --out=none").exit_code, 4);
 }
