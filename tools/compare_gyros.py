@@ -18,8 +18,10 @@ import tempfile
 
 import numpy as np
 
+from calibration_errors import NAMES as PARAMETERS
 from measure import DATA, SOURCE, run
 
+DELAY = PARAMETERS.index("t_d")
 NAMES = ["imu%d" % i for i in range(1, 6)]
 STRETCH_S = 4.0
 GRID_S = 1e-3  # rates are smooth at the time of a sample (10 ms), so that a line joins these
@@ -110,9 +112,9 @@ def main():
     print("\nLaid on a line:\n")
     own_ms = 1e3 * print_pairs([(on_a_line(t), w) for t, w in recorded])
     with tempfile.TemporaryDirectory() as temporary:
-        fits = [run(camgyro, folder, os.path.join(temporary, name))["td"]
+        fits = [run(camgyro, folder, "", os.path.join(temporary, name))
                 for name, folder in zip(NAMES, folders)]
-    td, sigma = np.array([f[0][0] for f in fits]), np.array([f[1][0] for f in fits])
+    td, sigma = (1e3 * np.array([fit[key][DELAY] for fit in fits]) for key in ("values", "sigma"))
     less = td - own_ms
     print("\n| Gyro | t_d [ms] | Its clock by the gyros alone [ms] | t_d less that [ms] |")
     print("|" + " --- |" * 4)
