@@ -4,33 +4,13 @@
 #include <string>
 
 #include "tests/frontend/readers/logger_folder.h"
+#include "tests/frontend/readers/sound_logs.h"
 
 namespace camgyro {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-const Files kJsonl = {
-    {"data.jsonl",
-     R"({"sensor":{"type":"gyroscope","values":[0.125,0.25,0.5]},"time":10.5})"
-     "\n"
-     R"({"sensor":{"type":"accelerometer","values":[0,0,9.75]},"time":10.502})"
-     "\n"
-     R"({"frames":[{"cameraInd":1,"time":7},{"cameraInd":0,"cameraParameters":{)"
-     R"("focalLengthX":50,"focalLengthY":40,"principalPointX":31.5,"principalPointY":23.5},)"
-     R"("exposureTimeSeconds":0.005,"time":10.5}],"number":0,"time":10.501})"
-     "\n\n"
-     R"({"sensor":{"type":"gyroscope","values":[0.25,0.25,0.5]},"time":10.505})"
-     "\n"
-     R"({"sensor":{"type":"barometer","values":[1013]},"time":10.506})"
-     "\n"
-     R"({"frames":[{"cameraInd":0}],"time":10.54})"
-     "\n"
-     R"({"arcore":{"position":{"x":1}},"time":10.55})"
-     "\n"
-     R"({"frames":[{"cameraInd":0}],"time":10.58})"
-     "\n"}};
 
 TEST(JsonlReader, PicturesAndSamples) {
   for (const char* video : {"data.mp4", "data.mov"}) {

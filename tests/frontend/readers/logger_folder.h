@@ -5,18 +5,16 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
 #include "tests/frontend/readers/recording_folder.h"
+#include "tests/frontend/readers/sound_logs.h"
 #include "tests/frontend/readers/write_video.h"
 
 namespace camgyro {
-
-using Files = std::map<std::string, std::string>;
 
 // A folder beside which nothing else is; three pictures, 40 ms apart, where a video is asked for.
 class LoggerFolder {

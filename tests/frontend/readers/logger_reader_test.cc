@@ -10,6 +10,7 @@
 
 #include "frontend/readers/read_recording.h"
 #include "tests/frontend/readers/logger_folder.h"
+#include "tests/frontend/readers/sound_logs.h"
 
 namespace camgyro {
 namespace {
@@ -17,12 +18,6 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-const Files kGcsv = {
-    {"a.gcsv",
-     "GYROFLOW IMU LOG\nversion,1.3\nid,test\norientation,YxZ\nnote,of a test, with a comma\n"
-     "frame_readout_time,15.5\nframe_readout_direction,1\ntscale,0.001\ngscale,0.5\nascale,0.25\n"
-     "t,gx,gy,gz,ax,ay,az\n0,1,2,3,4,0,0\n5,-1,2,3,0,4,0\n10,1,2,3,0,0,4\n"}};
 
 TEST(GcsvReader, ScalesAndTurns) {
   const LoggerFolder folder;
@@ -86,21 +81,6 @@ TEST(GcsvReader, TimesAreExact) {
   EXPECT_EQ(recording->gyro[1].stamp_ns, 9007199254745993000);
 }
 
-const Files kMars = {
-    {"gyro_accel.csv",
-     "Timestamp[nanosec],gx[rad/s],gy[rad/s],gz[rad/s],ax[m/s^2],ay[m/s^2],az[m/s^2],"
-     "Unix time[nanosec]\n1000000000,0.1,0.2,0.3,0,0,9.8,1600000000000000000\n"
-     "1005000000,0.4,0.2,0.3,0,0,9.8,1600000000005000000\n"},
-    {"frame_timestamps.txt", "Frame timestamp[nanosec]\n1000000000\n1033333000\n1066666000\n"},
-    // One more than the video has; the first without an exposure.
-    {"movie_metadata.csv",
-     "Timestamp[nanosec],fx[px],fy[px],Frame No.,Exposure time[nanosec],Sensor frame "
-     "duration[nanosec],Frame readout time[nanosec],ISO,Focal length,Focus distance,AF mode\n"
-     "1000000000,500,501,1,null,33333333,20000000,100,4.2,0.1,0\n"
-     "1033333333,500,502,2,5000000,33333333,20000000,100,4.2,0.1,0\n"
-     "1066666666,500,503,3,6000000,33333333,20000000,100,4.2,0.1,0\n"
-     "1100000000,500,900,4,7000000,33333333,20000000,100,4.2,0.1,0\n"}};
-
 TEST(MarsLoggerReader, Android) {
   const LoggerFolder folder;
   folder.Write(In("log", kMars));
@@ -139,11 +119,6 @@ TEST(MarsLoggerReader, Ios) {
   EXPECT_FALSE(recording->camera.readout_s);
 }
 
-const Files kOpenCamera = {
-    {"VID_1_gyro.csv", "0.1,0.2,0.3,1000000000\n0.4,0.2,0.3,1005000000\n"},
-    {"VID_1_accel.csv", "0,0,9.8,999000000\n0,0.1,9.8,1004000000\n0,0,9.7,1009000000\n"},
-    {"VID_1_timestamps.csv", "1000000000\n1040000000\n1080000000\n"}};
-
 TEST(OpenCameraReader, TakesTheVideoBesideTheFolder) {
   const LoggerFolder folder;
   folder.Write(In("log", kOpenCamera));
@@ -156,16 +131,6 @@ TEST(OpenCameraReader, TakesTheVideoBesideTheFolder) {
   EXPECT_EQ(recording->accel[1].stamp_ns, 1004000000);
   ExpectPictures(*recording);
 }
-
-const Files kSensorLogger = {
-    {"Gyroscope.csv",
-     "time,seconds_elapsed,z,y,x\n1698501144401773000,0.2,9,9,9\n1698501144411773000,0.21,9,9,9\n"},
-    {"GyroscopeUncalibrated.csv",
-     "time,seconds_elapsed,z,y,x\n1698501144401773000,0.2,0.3,0.2,0.1\n"
-     "1698501144411773000,0.21,0.6,0.5,0.4\n"},
-    {"TotalAcceleration.csv",
-     "time,seconds_elapsed,z,y,x\n1698501144401773000,0.2,9.8,0,1\n"
-     "1698501144411773000,0.21,9.8,0,2\n"}};
 
 TEST(SensorLoggerReader, VideoFromTheTimeInItsName) {
   const LoggerFolder folder;

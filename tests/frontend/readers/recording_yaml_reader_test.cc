@@ -6,25 +6,13 @@
 #include <string>
 
 #include "tests/frontend/readers/logger_folder.h"
+#include "tests/frontend/readers/sound_logs.h"
 
 namespace camgyro {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-const Files kDescribed = {
-    {"recording.yaml",
-     "gyro:\n  file: sensors/gyro.csv\n  separator: ';'\n  time: t_us\n  time_unit: us\n"
-     "  time_offset_s: 100\n  columns: [wx, wy, wz]\n  unit: deg/s\n"
-     "accel:\n  file: sensors/accel.csv\n  time: 4\n  time_unit: ms\n  columns: [1, 2, 3]\n"
-     "  unit: -g\n"
-     "camera:\n  video: clip.mp4\n  frames: frames.csv\n  time: start [s]\n  time_unit: s\n"
-     "  exposure: exposure [ms]\n  exposure_unit: ms\n  sensor_yaml: camera.yaml\n"},
-    {"sensors/gyro.csv", "n;wz;t_us;wy;wx\n0;30;500000;60;90\n1;30;505000;60;180\n"},
-    {"sensors/accel.csv", "# of the phone\n0,0,-1,100500\n0,-1,0,100505\n"},
-    {"frames.csv", "start [s],exposure [ms]\n100.5,5\n100.54,5\n100.58,10\n"},
-    {"camera.yaml", "intrinsics: [50, 40, 31.5, 23.5]\nreadout_time: 0.02\n"}};
 
 TEST(RecordingYamlReader, AnyTablesWithAVideo) {
   const LoggerFolder folder;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "tests/frontend/readers/logger_folder.h"
+#include "tests/frontend/readers/sound_logs.h"
 
 namespace camgyro {
 namespace {
@@ -11,15 +12,6 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-const Files kStray = {
-    {"imu.csv",
-     "timestamp, a_x, a_y, a_z, alpha_x, alpha_y, alpha_z\n"
-     "100.5, 0.5, -9.75, 0.0, 0.125, 0.25, 0.5\n100.51, 0.5, -9.75, 0.0, 0.25, 0.25, 0.5\n"},
-    {"odometry.csv",
-     "timestamp, frame, x, y, z, qx, qy, qz, qw\n100.5, 000000, 0, 0, 0, 0.6, 0, 0, 0.8\n"
-     "100.54, 000001, 0, 0, 0, 0, 0, 0, 1\n100.58, 000002, 0, 0, 0, 0, 0, 0, 1\n"},
-    {"camera_matrix.csv", "50.0, 0.0, 31.5\n0.0, 40.0, 23.5\n0.0, 0.0, 1.0"}};
 
 TEST(StrayScannerReader, PicturesAndSamples) {
   const LoggerFolder folder;
@@ -79,14 +71,6 @@ TEST(StrayScannerReader, DamageIsSurvived) {
   folder.WriteVideo("rgb.mp4");
   ExpectSurvivesDamage(folder, "", kStray);
 }
-
-const Files kIos = {
-    {"Gyro.txt", "1600000000.5,0.125,0.25,0.5\r\n1600000000.51,0.25,0.25,0.5\r\n"},
-    {"Accel.txt", "1600000000.5,0,-1,0\r\n1600000000.51,0,-1,0.5\r\n"},
-    {"Frames.txt",
-     "1600000000.5,0,500,502,320,240\r\n1600000000.54,1,501,503,320,240\r\n"
-     "1600000000.58,2,502,501,320,240\r\n"},
-    {"ARposes.txt", "1600000000.5,0,0,0,0.8,0.6,0,0\r\n1600000000.75,0,0,0,1,0,0,0\r\n"}};
 
 TEST(IosLoggerReader, PicturesAndSamples) {
   const LoggerFolder folder;

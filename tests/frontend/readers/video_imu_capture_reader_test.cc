@@ -1,13 +1,13 @@
-// VideoIMUCapture's protobuf, written here byte by byte as its recording.proto numbers the fields.
+// VideoIMUCapture's protobuf, written byte by byte.
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <cstring>
 #include <string>
 #include <vector>
 
 #include "frontend/readers/read_recording.h"
 #include "tests/frontend/readers/recording_folder.h"
+#include "tests/frontend/readers/video_meta_bytes.h"
 #include "tests/frontend/readers/write_video.h"
 
 namespace camgyro {
@@ -16,36 +16,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-std::string Varint(uint64_t value) {
-  std::string bytes;
-  for (; value >= 0x80; value >>= 7) bytes += static_cast<char>(0x80 | (value & 0x7f));
-  return bytes + static_cast<char>(value);
-}
-std::string Whole(int field, uint64_t value) {
-  return Varint(static_cast<uint64_t>(field) << 3) + Varint(value);
-}
-std::string Bytes(int field, const std::string& bytes) {
-  return Varint(static_cast<uint64_t>(field) << 3 | 2) + Varint(bytes.size()) + bytes;
-}
-std::string Floats(int field, const std::vector<float>& values) {
-  std::string bytes(values.size() * sizeof(float), '\0');
-  std::memcpy(bytes.data(), values.data(), bytes.size());
-  return Bytes(field, bytes);
-}
-std::string Float(int field, float value) {
-  std::string bytes(sizeof(float), '\0');
-  std::memcpy(bytes.data(), &value, sizeof(float));
-  return Varint(static_cast<uint64_t>(field) << 3 | 5) + bytes;
-}
-
-std::string Imu(uint64_t time_ns, const std::vector<float>& gyro) {
-  return Bytes(4, Whole(1, time_ns) + Floats(2, gyro) + Floats(3, {9, 9, 9}) +
-                      Floats(4, {0, 0.5f, 9.75f}) + Whole(6, 3));
-}
-std::string Picture(uint64_t time_ns, uint64_t number) {
-  return Bytes(5, Whole(1, time_ns) + Whole(2, number) + Whole(3, 5000000) + Whole(5, 20000000) +
-                      Float(8, 512.5f));
-}
+using namespace video_meta;  // NOLINT(google-build-using-namespace)
 
 class VideoImuCapture : public ::testing::Test {
  protected:
