@@ -25,6 +25,13 @@ endif()
 target_compile_definitions(camgyro_build_flags
                            INTERFACE $<$<CONFIG:Debug>:EIGEN_INITIALIZE_MATRICES_BY_NAN>)
 
+# camgyro_fuzzed(TARGET): the fuzzer sees which code of it an input reaches (CAMGYRO_FUZZ).
+function(camgyro_fuzzed target)
+  if(CAMGYRO_FUZZ)
+    target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link)
+  endif()
+endfunction()
+
 # camgyro_library(NAME SOURCES ... PUBLIC ... PRIVATE ...): library camgyro_NAME, alias camgyro::NAME.
 function(camgyro_library name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "SOURCES;PUBLIC;PRIVATE")
