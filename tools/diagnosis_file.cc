@@ -89,12 +89,6 @@ std::string ValueText(const CandidateResult& c) {
   return text;
 }
 
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 std::string RoundText(size_t number, const DiagnosisRound& round, const char* unit, double scale) {
   std::string text;
   if (round.added.empty()) return Format("%zu. ", number) + NothingAddedText(round) + "\n";
@@ -141,6 +135,12 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
 }
 
 }  // namespace
+
+std::string Joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
 
 std::string DiagnosisYaml(const Diagnosis& d) {
   YAML::Emitter out;

@@ -3,10 +3,14 @@
 #define CAMGYRO_TOOLS_DIAGNOSIS_FILE_H_
 
 #include <string>
+#include <vector>
 
 #include "estimator/diagnosis/diagnose.h"
 
 namespace camgyro {
+
+// Names, with commas between them.
+std::string Joined(const std::vector<std::string>& words);
 
 // diagnosis.yaml (docs/result_format.md).
 std::string DiagnosisYaml(const Diagnosis& diagnosis);

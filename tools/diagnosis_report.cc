@@ -12,12 +12,6 @@
 namespace camgyro {
 namespace {
 
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 std::vector<TableCell> Row(const std::vector<std::string>& texts) {
   std::vector<TableCell> row;
   for (const std::string& text : texts) row.push_back({text, "", 0.0});
