@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <utility>
 
 #include "frontend/readers/text.h"
+#include "frontend/readers/whole_file.h"
 
 namespace camgyro {
 namespace {
@@ -28,12 +28,12 @@ bool IsNumber(std::string_view cell) {
 }  // namespace
 
 CsvReader::CsvReader(const std::string& file) : file_(file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) {
-    status_ = BadInput(Concat(file, ": cannot be opened for reading"));
+  Result<std::string> content = ReadWholeFile(file);
+  if (!content) {
+    status_ = tl::unexpected(content.error());
     return;
   }
-  content_.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+  content_ = *std::move(content);
   if (content_.compare(0, 3, "\xEF\xBB\xBF") == 0) position_ = 3;
 }
 

@@ -14,6 +14,7 @@
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sample_rows.h"
 #include "frontend/readers/text.h"
+#include "frontend/readers/whole_file.h"
 
 namespace camgyro {
 namespace {
@@ -31,6 +32,7 @@ struct GcsvHead {
 };
 
 Result<GcsvHead> ReadHead(const std::string& file) {
+  if (Status is_file = CheckIsFile(file); !is_file) return tl::unexpected(is_file.error());
   std::ifstream in(file, std::ios::binary);
   if (!in) return BadInput(Concat(file, ": cannot be opened for reading"));
   GcsvHead head;

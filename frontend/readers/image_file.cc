@@ -1,13 +1,12 @@
 #include "frontend/readers/image_file.h"
 
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
 #include "frontend/readers/text.h"
+#include "frontend/readers/whole_file.h"
 
 namespace camgyro {
 namespace {
@@ -54,11 +53,11 @@ Result<cv::Mat> DecodeImage(ByteView bytes, int flags) {
 }
 
 Result<cv::Mat> ReadImage(const std::string& file, int flags) {
-  std::ifstream in(file, std::ios::binary);
-  const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(in)),
-                                   std::istreambuf_iterator<char>());
-  if (!in || bytes.empty()) return BadInput(Concat(file, ": cannot be read, expected an image"));
-  Result<cv::Mat> image = DecodeImage({bytes.data(), bytes.size()}, flags);
+  const Result<std::string> bytes = ReadWholeFile(file);
+  if (!bytes) return tl::unexpected(bytes.error());
+  if (bytes->empty()) return BadInput(Concat(file, ": is empty, expected an image"));
+  Result<cv::Mat> image =
+      DecodeImage({reinterpret_cast<const uint8_t*>(bytes->data()), bytes->size()}, flags);
   if (!image) return BadInput(Concat(file, ": ", image.error().message));
   return image;
 }

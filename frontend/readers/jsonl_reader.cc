@@ -12,6 +12,7 @@
 #include "frontend/readers/frame_order.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
+#include "frontend/readers/whole_file.h"
 
 namespace camgyro {
 namespace {
@@ -34,6 +35,7 @@ class Lines {
       : file_(file), recording_(recording), gyro_(recording) {}
 
   Status Read() {
+    if (Status is_file = CheckIsFile(file_); !is_file) return is_file;
     std::ifstream in(file_, std::ios::binary);
     if (!in) return BadInput(file_ + ": cannot be opened for reading");
     std::string text;

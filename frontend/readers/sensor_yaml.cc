@@ -4,10 +4,10 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <vector>
 
 #include "frontend/readers/text.h"
+#include "frontend/readers/whole_file.h"
 #include "frontend/readers/yaml_keys.h"
 
 namespace camgyro {
@@ -108,9 +108,9 @@ std::optional<Eigen::Quaterniond> ReadRotation(YamlKeys* keys) {
 Result<SensorYaml> ReadSensorYaml(const std::string& file) {
   SensorYaml result;
   if (!std::filesystem::exists(file)) return result;
-  std::ifstream in(file, std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  if (!in) return BadInput(Concat(file, ": cannot be read"));
+  Result<std::string> content = ReadWholeFile(file);
+  if (!content) return tl::unexpected(content.error());
+  std::string& text = *content;
   // OpenCV writes "%YAML:1.0", which is not YAML; a comment in its place keeps the line numbers.
   if (text.compare(0, 6, "%YAML:") == 0) text[0] = '#';
 

@@ -1,14 +1,18 @@
 #include "frontend/readers/video_container.h"
 
 extern "C" {
+#include <libavutil/dict.h>
 #include <libavutil/display.h>
 #include <libavutil/log.h>
+#include <libavutil/mem.h>
 }
 
 #include <algorithm>
 #include <cmath>
 
+#include "frontend/readers/bytes.h"
 #include "frontend/readers/text.h"
+#include "frontend/readers/whole_file.h"
 
 namespace camgyro {
 namespace {
@@ -17,6 +21,10 @@ bool IsGpmf(const AVStream& stream) {
   return stream.codecpar->codec_type == AVMEDIA_TYPE_DATA &&
          stream.codecpar->codec_tag == MKTAG('g', 'p', 'm', 'd');
 }
+
+// Whatever its name says, FFmpeg takes a file for what it begins like: also for a playlist, whose
+// videos can be anywhere, or on the network. These hold their pictures themselves.
+constexpr char kContainers[] = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mxf";
 
 int DisplayRotationDeg(const AVStream& stream) {
   const uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
@@ -28,9 +36,15 @@ int DisplayRotationDeg(const AVStream& stream) {
 }  // namespace
 
 Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file) {
+  if (Status is_file = CheckIsFile(file); !is_file) return tl::unexpected(is_file.error());
   av_log_set_level(AV_LOG_FATAL);
+  av_max_alloc(kLargestRecord);  // a few bytes of a header can claim 2 GiB
   AVFormatContext* context = nullptr;
-  int code = avformat_open_input(&context, file.c_str(), nullptr, nullptr);
+  AVDictionary* options = nullptr;
+  av_dict_set(&options, "format_whitelist", kContainers, 0);
+  av_dict_set(&options, "protocol_whitelist", "file", 0);
+  int code = avformat_open_input(&context, file.c_str(), nullptr, &options);
+  av_dict_free(&options);
   FfmpegPtr<AVFormatContext> owner(context);  // null after an error
   if (code >= 0) code = avformat_find_stream_info(context, nullptr);
   if (code < 0) {

@@ -27,8 +27,11 @@ struct VideoContainer {
 // short (fewer packets than its index lists), frames without or with repeated stamps.
 Result<VideoContainer> ReadVideoContainer(const std::string& file);
 
-// Opens a file and finds its streams. Lowers FFmpeg's log level to fatal, for the whole process:
-// errors are values here, and GoPro files have streams that it would print warnings about.
+// Opens a file of a container that holds its pictures itself (MP4 and QuickTime, Matroska, AVI,
+// MPEG-TS, MXF) and finds its streams; playlists are refused. Lowers FFmpeg's log level to fatal,
+// for the whole process: errors are values here, and GoPro files have streams that it would print
+// warnings about. Lowers the most that FFmpeg allocates at once to kLargestRecord, also for the
+// whole process.
 Result<FfmpegPtr<AVFormatContext>> OpenContainer(const std::string& file);
 
 }  // namespace camgyro

@@ -5,8 +5,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -17,6 +15,7 @@
 #include "frontend/readers/frame_order.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
+#include "frontend/readers/whole_file.h"
 #include "video_imu_capture.pb.h"
 
 namespace camgyro {
@@ -63,13 +62,13 @@ Status AddImuSample(const Place& place, const std::string& bytes, GyroCollector*
 // The records of the file, one after the other, so that a file that is cut short tells where.
 Status ReadMeta(const std::string& file, Recording* recording,
                 std::vector<video_imu::FrameInfo>* frames) {
-  std::ifstream in(file, std::ios::binary);
-  const std::string content{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (!in || content.size() > static_cast<size_t>(std::numeric_limits<int>::max())) {
-    return BadInput(Concat(file, ": cannot be read"));
+  const Result<std::string> content = ReadWholeFile(file);
+  if (!content) return tl::unexpected(content.error());
+  if (content->size() > static_cast<size_t>(std::numeric_limits<int>::max())) {
+    return BadInput(Concat(file, ": is larger than 2 GiB"));
   }
-  const int size = static_cast<int>(content.size());
-  CodedInputStream stream(reinterpret_cast<const uint8_t*>(content.data()), size);
+  const int size = static_cast<int>(content->size());
+  CodedInputStream stream(reinterpret_cast<const uint8_t*>(content->data()), size);
   GyroCollector gyro(recording);
   Place place{file};
   std::string bytes;

@@ -1,5 +1,6 @@
 // What is wrong with a folder is refused with file, line and expectation.
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
@@ -163,6 +164,31 @@ TEST(MalformedRecording, OtherSizeThanDeclared) {
   ASSERT_FALSE(recording);
   EXPECT_THAT(recording.error().message, HasSubstr("a.png: the picture has 32 x 24 pixels"));
   EXPECT_THAT(recording.error().message, HasSubstr("sensor.yaml says resolution [64, 48]"));
+}
+
+// A folder or a pipe in the place of any file.
+TEST(MalformedRecording, FilesThatAreNone) {
+  for (const char* file : {"imu0/data.csv", "cam0/data.csv", "cam0/tracks.csv", "cam0/sensor.yaml",
+                           "imu0/sensor.yaml", "cam0/data/a.png", "cam0/video.mp4"}) {
+    SCOPED_TRACE(file);
+    const RecordingFolder folder;
+    folder.Write(TrackRecording());
+    if (std::string(file).find("data/") != std::string::npos) {
+      folder.Write("cam0/data.csv", "1000000000,a.png\n1033000000,a.png\n");
+    }
+    folder.Remove(file);
+    std::filesystem::create_directories(folder.File(file));
+    const Result<Recording> in_a_folder = ReadRecording(folder.path());
+    EXPECT_FALSE(in_a_folder);
+    EXPECT_EQ(in_a_folder.error().kind, ErrorKind::kBadInput);
+    EXPECT_THAT(in_a_folder.error().message, HasSubstr(file));
+
+    folder.Remove(file);
+    ASSERT_EQ(mkfifo(folder.File(file).c_str(), 0600), 0);
+    const Result<Recording> in_a_pipe = ReadRecording(folder.path());
+    EXPECT_FALSE(in_a_pipe);
+    EXPECT_THAT(in_a_pipe.error().message, HasSubstr(file));
+  }
 }
 
 TEST(MalformedRecording, ImageThatIsNone) {

@@ -109,6 +109,22 @@ TEST(VideoReader, RefusesATableOfAnotherLength) {
   EXPECT_THAT(recording.error().message, HasSubstr("cam0/video.mp4 has 4; expected the same"));
 }
 
+// FFmpeg would follow them, out of the folder and into the network.
+TEST(VideoReader, RefusesPlaylists) {
+  const RecordingFolder folder;
+  WriteFolder(folder, Video(4));
+  std::filesystem::rename(folder.File("cam0/video.mp4"), folder.File("cam0/other.mp4"));
+  for (const char* playlist :
+       {"ffconcat version 1.0\nfile other.mp4\n",
+        "#EXTM3U\n#EXT-X-VERSION:3\n#EXT-X-TARGETDURATION:20\n#EXTINF:20,\nother.mp4\n"
+        "#EXT-X-ENDLIST\n"}) {
+    folder.Write("cam0/video.mp4", playlist);
+    const Result<Recording> recording = ReadRecording(folder.path());
+    ASSERT_FALSE(recording) << playlist;
+    EXPECT_THAT(recording.error().message, HasSubstr("cam0/video.mp4: cannot be read as a video"));
+  }
+}
+
 TEST(VideoReader, RefusesAVideoOfAnotherSize) {
   const RecordingFolder folder;
   WriteFolder(folder, Video(3));
