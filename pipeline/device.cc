@@ -14,8 +14,6 @@
 namespace camgyro {
 namespace {
 
-// Effects that are the device's. Others belong to a recording: clocks, focus, exposure,
-// temperature.
 constexpr std::array<const char*, 10> kOfDevice = {"radial_distortion", "tangential_distortion",
                                                    "aspect_ratio",      "readout_direction",
                                                    "readout_nonlinear", "gyro_scale",
@@ -37,8 +35,7 @@ std::vector<EffectSet::Item> CommonEffects(const std::vector<const CalibrationRe
   const Calibration& first = reports.front()->calibration;
   if (!first.effects) return common;
   for (const EffectSet::Item& item : first.effects->items()) {
-    const bool of_device = std::any_of(kOfDevice.begin(), kOfDevice.end(),
-                                       [&](const char* name) { return item.entry->name == name; });
+    const bool of_device = IsEffectOfDevice(item.entry->name);
     const bool everywhere =
         std::all_of(reports.begin(), reports.end(), [&](const CalibrationReport* report) {
           return FindItem(report->calibration, item) != nullptr;
@@ -176,6 +173,11 @@ void EmitRepeatability(YAML::Emitter& out, const DeviceReport& device, size_t i)
 }
 
 }  // namespace
+
+bool IsEffectOfDevice(const std::string& name) {
+  return std::any_of(kOfDevice.begin(), kOfDevice.end(),
+                     [&](const char* known) { return name == known; });
+}
 
 Result<DeviceReport> CombineToDevice(const std::vector<std::string>& names,
                                      const std::vector<const CalibrationReport*>& reports,

@@ -11,6 +11,10 @@
 
 namespace camgyro {
 
+// Is an effect of this name the device's (its lens, its gyro)? Others belong to a recording:
+// clocks, focus, exposure, temperature.
+bool IsEffectOfDevice(const std::string& name);
+
 struct DeviceReport {
   // Its calibration is the device's: lens, readout, mounting, and those fitted effects that belong
   // to the device, of all recordings together; delay and bias are the mean of what the recordings

@@ -2,11 +2,14 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "pipeline/device.h"
 
 namespace camgyro {
 namespace {
@@ -23,6 +26,10 @@ class Section {
   Section(const YAML::Node& root, std::string name) : name_(std::move(name)), node_(root[name_]) {
     if (node_ && !node_.IsMap()) Fail(node_, "", "expected a map of keys to values");
   }
+  // An entry of a list of the section `name`.
+  Section(std::string name, const YAML::Node& entry) : name_(std::move(name)), node_(entry) {
+    if (!node_.IsMap()) Fail(node_, "", "expected a map of keys to values");
+  }
 
   // The numbers of `key: {value: ...}` or `key: ...`; none if the key is absent.
   std::vector<double> Numbers(const char* key, size_t count) const {
@@ -33,10 +40,10 @@ class Section {
       numbers = value.IsSequence() ? value.as<std::vector<double>>()
                                    : std::vector<double>{value.as<double>()};
     } catch (const YAML::Exception&) {
-      Fail(value, key, "expected " + Count(count));
+      Fail(value, key, "expected " + Amount(count));
     }
     if (numbers.size() != count) {
-      Fail(value, key, "expected " + Count(count) + ", got " + std::to_string(numbers.size()));
+      Fail(value, key, "expected " + Amount(count) + ", got " + std::to_string(numbers.size()));
     }
     for (const double number : numbers) {
       if (!std::isfinite(number)) Fail(value, key, "expected a finite number");
@@ -47,6 +54,15 @@ class Section {
   double Number(const char* key, double absent) const {
     const std::vector<double> numbers = Numbers(key, 1);
     return numbers.empty() ? absent : numbers[0];
+  }
+
+  // A whole number that an int holds; 0 if the key is absent.
+  int Count(const char* key) const {
+    const double number = Number(key, 0.0);
+    if (!(number >= 0.0 && number <= 2147483647.0 && number == std::floor(number))) {
+      Fail(Value(key), key, "expected a whole number");
+    }
+    return static_cast<int>(number);
   }
 
   double Positive(const char* key, double absent) const {
@@ -72,7 +88,7 @@ class Section {
   }
 
  private:
-  static std::string Count(size_t count) {
+  static std::string Amount(size_t count) {
     return count == 1 ? "a number" : "a list of " + std::to_string(count) + " numbers";
   }
 
@@ -221,6 +237,58 @@ std::vector<std::string> ParseEffectNames(const YAML::Node& root) {
   return names;
 }
 
+// The state's numbers under a key that has to be there.
+StateVector StateNumbers(const Section& section, const char* key) {
+  const std::vector<double> numbers = section.Numbers(key, kStateSize);
+  if (numbers.empty()) {
+    section.Fail(YAML::Node(YAML::NodeType::Undefined), key,
+                 "is missing; expected a calibration.yaml that this camgyro has written");
+  }
+  return StateVector::Map(numbers.data());
+}
+
+void ParseShares(const YAML::Node& root, CalibrationReport* report) {
+  const YAML::Node systematic = root["systematic"];
+  if (!systematic || !systematic.IsMap()) return;
+  const YAML::Node device = systematic["device"];
+  if (device && device.IsScalar()) report->device_class = device.Scalar();
+  for (const YAML::Node& share : systematic["effects"]) {
+    const Section numbers("systematic", share);
+    const YAML::Node name = numbers.Child("name");
+    if (!name || !name.IsScalar()) numbers.Fail(name, "name", "expected the name of an effect");
+    report->systematic.push_back({name.Scalar(), StateNumbers(numbers, "sigma")});
+  }
+}
+
+CalibrationReport ParseReport(const YAML::Node& root) {
+  CalibrationReport report;
+  Calibration& c = report.calibration;
+  c = Parse(root);
+  for (const std::string& name : ParseEffectNames(root)) {
+    if (!IsEffectOfDevice(name)) continue;
+    throw Complaint{root["effects"].Mark(),
+                    "effects: " + name + ": expected a calibration without it, to be combined"};
+  }
+  const Section prior(root, "prior");
+  report.prior.mean = Moved(c, StateNumbers(prior, "offset"));
+  report.prior.sigma = StateNumbers(prior, "sigma");
+  if (!(report.prior.sigma.minCoeff() > 0.0)) {
+    prior.Fail(prior.Child("sigma"), "sigma", "expected numbers above zero");
+  }
+  // Else no inverse means anything.
+  if (!(c.covariance.llt().info() == Eigen::Success)) {
+    throw Complaint{root["covariance"].Mark(), "covariance: matrix: expected a covariance"};
+  }
+  ParseShares(root, &report);
+  const Section quality(root, "quality");
+  report.quality.pairs = quality.Count("pairs");
+  report.quality.matches = quality.Count("matches");
+  report.quality.inlier_ratio = quality.Number("inlier_ratio", 0.0);
+  report.quality.noise_px = quality.Number("noise_px", 0.0);
+  report.quality.rms_px = quality.Number("rms_px", 0.0);
+  return report;
+}
+
 std::string Place(const std::string& path, const YAML::Mark& mark) {
   return mark.is_null() ? path : path + ":" + std::to_string(mark.line + 1);
 }
@@ -241,6 +309,10 @@ Result<T> ParseFile(const std::string& path, T (*parse)(const YAML::Node& root))
 }  // namespace
 
 Result<Calibration> ReadCalibration(const std::string& path) { return ParseFile(path, Parse); }
+
+Result<CalibrationReport> ReadCalibrationReport(const std::string& path) {
+  return ParseFile(path, ParseReport);
+}
 
 Result<std::vector<std::string>> ReadEffectNames(const std::string& path) {
   return ParseFile(path, ParseEffectNames);

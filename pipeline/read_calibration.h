@@ -7,6 +7,7 @@
 
 #include "core/calibration.h"
 #include "core/result.h"
+#include "estimator/calibrate.h"
 
 namespace camgyro {
 
@@ -19,6 +20,12 @@ namespace camgyro {
 // Errors: kBadInput naming file, line and key: not YAML; wrong type, length or range; not finite (a
 // calibration from attitudes has no lens); an unknown distortion model.
 Result<Calibration> ReadCalibration(const std::string& path);
+
+// The same with what CombineToDevice needs beside: prior, shares of undeclared effects, numbers of
+// the fit. Effects that belong to a recording are left aside. Errors also: no prior (a file of
+// another program, or of an older camgyro); effects of the device, whose shapes the file does not
+// hold; a covariance that is none.
+Result<CalibrationReport> ReadCalibrationReport(const std::string& path);
 
 // Names of the effects that the file lists. Errors as above.
 Result<std::vector<std::string>> ReadEffectNames(const std::string& path);

@@ -145,6 +145,15 @@ void EmitSystematic(YAML::Emitter& out, const CalibrationReport& report) {
   out << YAML::EndSeq << YAML::EndMap;
 }
 
+// In the order of the covariance. The mean as its difference from the result, since the rotation's
+// is a small angle then.
+void EmitPrior(YAML::Emitter& out, const Prior& prior, const Calibration& c) {
+  BeginSection(out, "prior");
+  out << YAML::Key << "offset" << YAML::Value << YAML::Flow
+      << Segment(Difference(prior.mean, c), 0, kStateSize) << YAML::Key << "sigma" << YAML::Value
+      << YAML::Flow << Segment(prior.sigma, 0, kStateSize) << YAML::EndMap;
+}
+
 void EmitQuality(YAML::Emitter& out, const CalibrationReport& report, bool attitudes) {
   const FitQuality& quality = report.quality;
   BeginSection(out, "quality");
@@ -245,6 +254,7 @@ std::string CalibrationYaml(const CalibrationReport& report, bool attitudes) {
   out << YAML::EndMap;
   EmitEffects(out, c);
   EmitCovariance(out, c);
+  EmitPrior(out, report.prior, c);
   EmitSystematic(out, report);
   EmitQuality(out, report, attitudes);
   out << YAML::EndMap;

@@ -90,6 +90,57 @@ TEST_F(ReadCalibrationTest, FittedKannalaBrandtIsWrittenInItsOwnCoefficients) {
   }
 }
 
+// Recordings are combined from their files as from memory.
+TEST_F(ReadCalibrationTest, AReportIsReadBackToBeCombined) {
+  CalibrationReport report;
+  Calibration& c = report.calibration;
+  c.width_px = 320;
+  c.height_px = 240;
+  c.lens = MakePinhole(290.125, {161.5, 118.25});
+  c.q_gyro_cam = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  c.covariance = 1e-4 * StateCovariance::Identity();
+  c.total_covariance = 4e-4 * StateCovariance::Identity();
+  c.determined.fill(true);
+  StateVector d = StateVector::LinSpaced(0.01, 0.11);
+  report.prior.mean = Moved(c, d);
+  report.prior.sigma = StateVector::LinSpaced(1.0, 11.0);
+  report.device_class = "phone";
+  report.systematic = {{"gyro_scale", StateVector::LinSpaced(0.0, 1.0)}};
+  report.quality = {100, 5000, 0.75, 0.5, 0.625};
+  const std::string yaml = CalibrationYaml(report, /*attitudes=*/false);
+  const auto read_report = [&](const std::string& text) {
+    std::ofstream(Path("c.yaml")) << text;
+    return ReadCalibrationReport(Path("c.yaml"));
+  };
+  const Result<CalibrationReport> read = read_report(yaml);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_LT(Difference(read->calibration, c).norm(), 1e-9);
+  EXPECT_EQ(*read->calibration.total_covariance, *c.total_covariance);
+  EXPECT_LT(Difference(read->prior.mean, report.prior.mean).norm(), 1e-9);
+  EXPECT_LT((read->prior.sigma - report.prior.sigma).norm(), 1e-9);
+  EXPECT_EQ(read->device_class, "phone");
+  ASSERT_EQ(read->systematic.size(), 1u);
+  EXPECT_EQ(read->systematic[0].effect, "gyro_scale");
+  EXPECT_LT((read->systematic[0].sigma - report.systematic[0].sigma).norm(), 1e-9);
+  EXPECT_EQ(read->quality.matches, 5000);
+  EXPECT_EQ(read->quality.rms_px, 0.625);
+
+  const auto with = [&](const std::string& before, const std::string& after) {
+    std::string text = yaml;
+    text.replace(text.find(before), before.size(), after);
+    const Result<CalibrationReport> other = read_report(text);
+    return other ? std::string("was read") : other.error().message;
+  };
+  EXPECT_THAT(with("prior:", "other:"), HasSubstr("prior: offset: is missing; expected a"));
+  EXPECT_THAT(with("sigma: [1, 2,", "sigma: [0, 2,"), HasSubstr("prior: sigma: expected numbers"));
+  EXPECT_THAT(with("- [0.0001,", "- [-0.0001,"), HasSubstr("matrix: expected a covariance"));
+  EXPECT_THAT(with("matches: 5000", "matches: 5e99"), HasSubstr("matches: expected a whole"));
+  EXPECT_THAT(with("effects:\n  []", "effects: [aspect_ratio]"),
+              HasSubstr("effects: aspect_ratio: expected a calibration without it"));
+  // That of a recording is not the device's.
+  EXPECT_EQ(with("effects:\n  []", "effects: [clock_skew]"), "was read");
+}
+
 TEST_F(ReadCalibrationTest, AbsentSectionsKeepDefaults) {
   const Result<Calibration> read = Read("camera: {resolution: [64, 48], focal_px: 50}\n");
   ASSERT_TRUE(read) << read.error().message;
