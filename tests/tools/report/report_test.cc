@@ -76,10 +76,12 @@ TEST_F(ReportTest, BrowserShowsTheNumbersOfTheCalibration) {
     GTEST_SKIP() << "chromium-headless-shell is not installed: the report is NOT TESTED in a "
                     "browser";
   }
-  Simulate(kHandheld, "a");
-  ASSERT_EQ(Run("calibrate a --out=result --quiet").exit_code, 0);
+  // A name that would be an element, whose request the page's policy would complain of.
+  Simulate(kHandheld, "<img src=x onerror=alert(1)>");
+  ASSERT_EQ(Run("calibrate '<img src=x onerror=alert(1)>' --out=result --quiet").exit_code, 0);
   const Page page = Load(Path("result/report.html"));
   EXPECT_EQ(page.console, "");
+  EXPECT_THAT(page.dom, AllOf(HasSubstr("&lt;img src=x onerror"), Not(HasSubstr("<img src=x"))));
   // 11 parameters, the delay search, 3 rates, 3 profiles; dygraphs draws each on two canvases.
   EXPECT_THAT(page.dom, HasSubstr("data-charts=\"18\""));
   EXPECT_EQ(Count(page.dom, "<figure class=\"chart\""), 18);
