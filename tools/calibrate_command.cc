@@ -1,7 +1,6 @@
 // `camgyro calibrate RECORDING... --out DIR`: the main job.
 #include <gflags/gflags.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "pipeline/run.h"
 #include "tools/commands.h"
 #include "tools/fit_flags.h"
+#include "tools/folder_names.h"
 #include "tools/progress_bar.h"
 #include "tools/recording_input.h"
 #include "tools/report/calibrate_report.h"
@@ -117,23 +117,6 @@ Result<Calibrated> CalibrateOne(const std::string& path, const std::string& fold
                 files.folder().c_str(), has_frame_times ? ", frame_times.csv" : "");
   }
   return Calibrated{std::move(run->report), attitudes};
-}
-
-// The last part of each path, with a number where two would be the same.
-std::vector<std::string> FolderNames(const std::vector<std::string>& paths) {
-  std::vector<std::string> names;
-  for (const std::string& path : paths) {
-    std::filesystem::path last = std::filesystem::path(path).lexically_normal();
-    if (!last.has_filename()) last = last.parent_path();
-    std::string name = last.stem().string();
-    if (name.empty() || name == "." || name == "..") name = "recording";
-    const std::string plain = name;
-    for (int n = 2; std::find(names.begin(), names.end(), name) != names.end(); ++n) {
-      name = plain + "_" + std::to_string(n);
-    }
-    names.push_back(name);
-  }
-  return names;
 }
 
 // Each recording by itself, then what they say of their device together. A recording that cannot be

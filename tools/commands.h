@@ -22,6 +22,7 @@ namespace camgyro {
   ROW(Stabilize)              \
   ROW(Rectify)                \
   ROW(Odometry)               \
+  ROW(Batch)                  \
   ROW(Help)
 
 #define CAMGYRO_DECLARE(name) Command name##Command();
