@@ -1,87 +1,15 @@
 #include "estimator/diagnosis/pair_scores.h"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/parallel.h"
+#include "estimator/diagnosis/pair_system.h"
 #include "estimator/window/pair_graph.h"
-#include "estimator/window/pair_view.h"
-#include "factors/rotation_manifold.h"
 
 namespace camgyro {
 namespace {
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-// The model's effects and the candidates side by side; candidates at zero.
-struct AllEffects {
-  std::shared_ptr<const EffectSet> set;
-  Eigen::VectorXd values;
-  double free_turn_rad_s = 0.0;  // what candidates widen the prior of the turn to; 0: none does
-};
-
-AllEffects Join(const Calibration& calibration, const EffectSet* candidates) {
-  auto set = std::make_shared<EffectSet>();
-  if (calibration.effects) {
-    for (const auto& item : calibration.effects->items()) {
-      set->Add(item.entry, item.shape, item.effect);
-    }
-  }
-  const int present = set->size();
-  if (candidates != nullptr) {
-    for (const auto& item : candidates->items()) set->Add(item.entry, item.shape, item.effect);
-  }
-  AllEffects all;
-  if (candidates != nullptr) all.free_turn_rad_s = candidates->widened_sigma(PairLatent::kTurn);
-  all.values = Eigen::VectorXd::Zero(set->size());
-  if (present > 0) all.values.head(present) = calibration.effect_values;
-  all.set = set;
-  return all;
-}
-
-// A factor's residuals and its derivatives by blocks.
-struct Evaluated {
-  Eigen::VectorXd r;
-  std::vector<RowMajor> J;
-};
-
-Evaluated Evaluate(const ceres::CostFunction& cost, const std::vector<const double*>& parameters) {
-  Evaluated e;
-  e.r.resize(cost.num_residuals());
-  std::vector<double*> jacobians;
-  e.J.reserve(parameters.size());
-  for (const int size : cost.parameter_block_sizes()) {
-    e.J.emplace_back(cost.num_residuals(), size);
-    jacobians.push_back(e.J.back().data());
-  }
-  if (!cost.Evaluate(parameters.data(), e.r.data(), jacobians.data())) e.r.resize(0);
-  return e;
-}
-
-// The reading's change by bias and effects, through the rates of a pair.
-Eigen::MatrixXd RateColumnsOf(const AllEffects& all, const std::vector<double>& times_s,
-                              const Eigen::Matrix3Xd& rates) {
-  Eigen::MatrixXd columns(rates.size(), 3 + all.set->size());
-  for (Eigen::Index i = 0; i < rates.cols(); ++i) {
-    columns.block<3, 3>(3 * i, 0).setIdentity();
-    Eigen::Matrix3Xd effects(3, all.set->size());
-    all.set->ChangeRate(times_s[static_cast<size_t>(i)], rates.col(i), effects);
-    columns.block(3 * i, 3, 3, effects.cols()) = effects;
-  }
-  return columns;
-}
-
-// r and J (state, effects) of one pair with the pair's own columns N, which have precisions P.
-struct PairSystem {
-  Eigen::VectorXd r;
-  Eigen::MatrixXd J, N;
-  Eigen::VectorXd prior;  // of N's columns, 1 / sigma^2, around zero
-  Eigen::VectorXd at;     // where they are
-  int bend_column = -1;   // of N, where a candidate frees the bend; -1: none does
-  BendVector free_bend;   // 1 / sigma^2 of a bend that is free
-};
 
 void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore* block) {
   Eigen::MatrixXd A = s.N.transpose() * s.N;
@@ -126,116 +54,12 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   pair->latent_gain = two_log(wide) - two_log(s.prior);
 }
 
-// A pair's factor with all effects, linearised where the calibration puts it.
-struct LinearPair {
-  PairView view;
-  PairPlane plane;  // of residuals that have a direction
-  std::vector<BlockKind> blocks;
-  Evaluated factor;
-
-  // By the only block of a kind.
-  const RowMajor& J(BlockKind kind) const {
-    return factor
-        .J[static_cast<size_t>(std::find(blocks.begin(), blocks.end(), kind) - blocks.begin())];
-  }
-};
-
-// False where the gyro does not cover the pair, or it has too few matches or no value.
-bool LinearizePair(const PairResidual& residual, const EstimationInput& input,
-                   const TimedPair& pair, const Calibration& c, const AllEffects& all, double noise,
-                   const PairGraphOptions& options, LinearPair* linear) {
-  PairView& view = linear->view;
-  if (!ViewPair(input, pair, c, noise, options, &view)) return false;
-  if (!residual.facts().of_attitudes &&
-      static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches) {
-    return false;
-  }
-  if (residual.facts().has_direction) linear->plane = FitPlane(view);
-  auto measurement = std::make_shared<PairMeasurement>(view.measurement);
-  measurement->effects = all.set->size() > 0 ? all.set : nullptr;
-  const ShutterParameters shutter = ShutterOf(c);
-  PairParameters at;
-  at.lens = c.lens.data();
-  at.shutter = shutter.data();
-  at.q_gyro_cam = c.q_gyro_cam.coeffs().data();
-  at.tau = linear->plane.tau.data();
-  at.bend = linear->plane.bend.data();
-  at.effects = all.values.data();
-  at.rates = {view.rates.data()};
-  linear->blocks = residual.Blocks(*measurement);
-  linear->factor = Evaluate(*residual.MakeCost(measurement, pair.id), at.InOrder(linear->blocks));
-  return linear->factor.r.size() > 0;
-}
-
-// What state and effects change.
-void FillShared(const LinearPair& linear, const Calibration& c, const AllEffects& all,
-                PairSystem* s) {
-  const bool with_effects = all.set->size() > 0;
-  const Eigen::MatrixXd through_rates =
-      linear.J(BlockKind::kRates) *
-      RateColumnsOf(all, linear.view.measurement.rate_times_s, linear.view.rates);
-  s->r = linear.factor.r;
-  s->J.setZero(s->r.size(), kStateSize + all.set->size());
-  if (std::count(linear.blocks.begin(), linear.blocks.end(), BlockKind::kLens) > 0) {
-    s->J.middleCols<3>(kStateFocal) = linear.J(BlockKind::kLens).leftCols<3>();
-  }
-  s->J.col(kStateReadout) = linear.J(BlockKind::kShutter).col(kReadout);
-  s->J.col(kStateDelay) = linear.J(BlockKind::kShutter).col(kDelay);
-  s->J.middleCols<3>(kStateBias) = -through_rates.leftCols<3>();
-  RotationManifold manifold;
-  Eigen::Matrix<double, 4, 3, Eigen::RowMajor> plus;
-  manifold.PlusJacobian(c.q_gyro_cam.coeffs().data(), plus.data());
-  s->J.middleCols<3>(kStateRotation) = linear.J(BlockKind::kRotation) * plus;
-  s->J.rightCols(all.set->size()) = -through_rates.rightCols(all.set->size());
-  if (with_effects) s->J.rightCols(all.set->size()) += linear.J(BlockKind::kEffects);
-}
-
-// What is the pair's own: direction, bend, and noise of the rates as PairGraph has it, its means
-// over some samples (of attitudes: each).
-void FillOwn(const PairResidual& residual, const LinearPair& linear, const TimedPair& pair,
-             const Calibration& c, const AllEffects& all, const PairGraphOptions& options,
-             PairSystem* s) {
-  const PairMeasurement& m = linear.view.measurement;
-  const RowMajor& by_rates = linear.J(BlockKind::kRates);
-  const Eigen::Index samples = linear.view.rates.cols();
-  const double interval_s = (m.rate_times_s.back() - m.rate_times_s.front()) / (samples - 1.0);
-  const Eigen::Index step =
-      residual.facts().of_attitudes ? 1 : options.RateStep(interval_s, c.lens[kFocal]);
-  const Eigen::Index values = (samples + step - 1) / step;
-  const Eigen::Index own = residual.facts().has_direction ? 8 : 0;
-  s->N.setZero(s->r.size(), own + 3 * values);
-  s->prior.setZero(s->N.cols());
-  s->at.setZero(s->N.cols());
-  if (own > 0) {
-    const Eigen::Vector3d u = linear.plane.tau.unitOrthogonal(), v = linear.plane.tau.cross(u);
-    s->N.col(0) = linear.J(BlockKind::kDirection) * u;
-    s->N.col(1) = linear.J(BlockKind::kDirection) * v;
-    s->N.middleCols<6>(2) = linear.J(BlockKind::kBend);
-    s->prior.segment<6>(2) = linear.view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
-    s->at.segment<6>(2) = linear.plane.bend;
-  }
-  for (Eigen::Index k = 0; k < values; ++k) {
-    const Eigen::Index count = std::min(step, samples - k * step);
-    for (Eigen::Index i = k * step; i < k * step + count; ++i) {
-      s->N.middleCols<3>(own + 3 * k) += by_rates.middleCols<3>(3 * i);
-    }
-    s->prior.segment<3>(own + 3 * k) =
-        static_cast<double>(count) * options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse();
-  }
-  if (own > 0 && all.free_turn_rad_s > 0.0) {
-    s->bend_column = 2;
-    s->free_bend = BendSigma(all.free_turn_rad_s, c.readout_s, pair.time_b_s - pair.time_a_s)
-                       .cwiseAbs2()
-                       .cwiseInverse();
-  }
-}
-
 }  // namespace
 
 Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>& blocks,
                      const Calibration& calibration, std::shared_ptr<const EffectSet> candidates,
                      double noise, const PairGraphOptions& options) {
-  const AllEffects all = Join(calibration, candidates.get());
+  const AllEffects all = AllEffectsOf(calibration, candidates.get());
   Scores scores;
   scores.num_model = kStateSize + static_cast<int>(calibration.effect_values.size());
   const Eigen::Index size = kStateSize + all.set->size();
@@ -248,20 +72,14 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
     sum.H.setZero(size, size);
     if (!block.empty()) sum.time_s = 0.5 * (block.front().time_a_s + block.back().time_b_s);
     for (const TimedPair& pair : block) {
-      const PairResidual& residual = ResidualOf(pair, options);
-      LinearPair linear;
-      if (!LinearizePair(residual, input, pair, calibration, all, noise, options, &linear)) {
-        continue;
-      }
       PairSystem system;
-      FillShared(linear, calibration, all, &system);
-      FillOwn(residual, linear, pair, calibration, all, options, &system);
+      if (!MakePairSystem(input, pair, calibration, all, noise, options, &system)) continue;
       PairScore score;
       score.frame_b = pair.frame_b;
       score.time_s = pair.time_b_s;
       // The direction takes two; the bend none, since chi2 has the penalty of its prior.
-      score.residuals =
-          static_cast<int>(system.r.size()) - (residual.facts().has_direction ? 2 : 0);
+      score.residuals = static_cast<int>(system.r.size()) -
+                        (ResidualOf(pair, options).facts().has_direction ? 2 : 0);
       ProjectInto(system, scores.num_model, &score, &sum);
       pairs[b].push_back(std::move(score));
     }

@@ -1,0 +1,44 @@
+// One pair of frames as linear equations: its residuals, and how all that it depends on changes
+// them.
+#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SYSTEM_H_
+#define CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SYSTEM_H_
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "core/calibration.h"
+#include "core/effects/catalogue.h"
+#include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_graph_options.h"
+#include "factors/coplanarity_plane.h"
+
+namespace camgyro {
+
+// The model's effects and the candidates side by side; candidates at zero.
+struct AllEffects {
+  std::shared_ptr<const EffectSet> set;
+  Eigen::VectorXd values;
+  double free_turn_rad_s = 0.0;  // what candidates widen the prior of the turn to; 0: none does
+};
+AllEffects AllEffectsOf(const Calibration& calibration, const EffectSet* candidates);
+
+// r and J (state, effects) of one pair with the pair's own columns N, which have precisions P.
+struct PairSystem {
+  Eigen::VectorXd r;
+  Eigen::MatrixXd J, N;
+  Eigen::VectorXd prior;  // of N's columns, 1 / sigma^2, around zero
+  Eigen::VectorXd at;     // where they are
+  int bend_column = -1;   // of N, where a candidate frees the bend; -1: none does
+  BendVector free_bend;   // 1 / sigma^2 of a bend that is free
+};
+
+// False where the gyro does not cover the pair, or it has too few matches or no value. noise: of a
+// pixel [px], of a rotation [rad] for attitudes.
+[[nodiscard]] bool MakePairSystem(const EstimationInput& input, const TimedPair& pair,
+                                  const Calibration& calibration, const AllEffects& all,
+                                  double noise, const PairGraphOptions& options,
+                                  PairSystem* system);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SYSTEM_H_
