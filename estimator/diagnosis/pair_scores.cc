@@ -26,11 +26,20 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
   H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
   H.noalias() -= NJ.transpose() * X;
   pair->chi2 = s.r.squaredNorm() + s.at.dot(s.prior.cwiseProduct(s.at)) - Nr.dot(x);
+  if (s.times_column >= 0) {
+    // log det(1 + s^2 W), W the information of the times with all else of the pair projected out:
+    // they have a covariance of (W + s^-2)^-1.
+    const Eigen::MatrixXd unit =
+        Eigen::MatrixXd::Identity(s.N.cols(), s.N.cols()).middleCols<2>(s.times_column);
+    const Eigen::Matrix2d covariance = solver.solve(unit).middleRows<2>(s.times_column);
+    pair->log_det = -std::log(covariance.determinant() * s.prior.segment<2>(s.times_column).prod());
+  }
   pair->g = g;
   pair->H = H.topLeftCorner(num_model, num_model);
   block->g += g;
   block->H += H;
   block->chi2 += pair->chi2;
+  block->log_det += pair->log_det;
   block->residuals += pair->residuals;
   ++block->pairs;
   if (s.bend_column < 0) return;

@@ -1,6 +1,6 @@
 // Scores: the derivative of the fit's cost by every parameter that is, or could be, in the model,
-// with what belongs to one pair of frames alone (direction, its turn, the noise of the gyro)
-// projected out.
+// with what belongs to one pair of frames alone (direction, its turn, the noise of the gyro, the
+// frames' own times where the model has them) projected out.
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SCORES_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SCORES_H_
 
@@ -24,6 +24,9 @@ struct BlockScore {
   int pairs = 0;
   int residuals = 0;  // that could vary: without two per pair for its direction
   double chi2 = 0.0;
+  // Of the frames' own times in the model: chi2 + log_det is -2 log of their likelihood, whatever
+  // the times, so that a model with them compares with one without, where it is 0.
+  double log_det = 0.0;
   Eigen::VectorXd g;
   Eigen::MatrixXd H;
 };
@@ -33,7 +36,7 @@ struct PairScore {
   int frame_b = 0;  // second frame, index into Recording::frames
   double time_s = 0.0;
   int block = 0;
-  double chi2 = 0.0;
+  double chi2 = 0.0, log_det = 0.0;
   int residuals = 0;
   Eigen::VectorXd g;
   Eigen::MatrixXd H;

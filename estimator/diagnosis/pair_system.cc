@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/pair_system.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -64,16 +65,22 @@ bool LinearizePair(const PairResidual& residual, const EstimationInput& input,
                    const TimedPair& pair, const Calibration& c, const AllEffects& all, double noise,
                    const PairGraphOptions& options, LinearPair* linear) {
   PairView& view = linear->view;
-  if (!ViewPair(input, pair, c, noise, options, &view)) return false;
-  if (!residual.facts().of_attitudes &&
-      static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches) {
+  if (residual.facts().has_direction) {
+    // At the frames' own times, if they have any.
+    if (!FitPair(input, pair, c, noise, options, &view, &linear->plane)) return false;
+  } else if (!ViewPair(input, pair, c, noise, options, &view) ||
+             (!residual.facts().of_attitudes &&
+              static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches)) {
     return false;
   }
-  if (residual.facts().has_direction) linear->plane = FitPlane(view);
   auto measurement = std::make_shared<PairMeasurement>(view.measurement);
   measurement->effects = all.set->size() > 0 ? all.set : nullptr;
+  measurement->own_times =
+      residual.facts().with_frame_times && (all.with_times || all.frame_time_spread_s > 0.0);
   const ShutterParameters shutter = ShutterOf(c);
+  const double as_in_view = 0.0;  // the measurement's frames have their offsets
   PairParameters at;
+  at.own_times = {&as_in_view, &as_in_view};
   at.lens = c.lens.data();
   at.shutter = shutter.data();
   at.q_gyro_cam = c.q_gyro_cam.coeffs().data();
@@ -107,10 +114,15 @@ void FillShared(const LinearPair& linear, const Calibration& c, const AllEffects
   s->J.middleCols<3>(kStateRotation) = linear.J(BlockKind::kRotation) * plus;
   s->J.rightCols(all.set->size()) = -through_rates.rightCols(all.set->size());
   if (with_effects) s->J.rightCols(all.set->size()) += linear.J(BlockKind::kEffects);
+  const auto times = std::find(linear.blocks.begin(), linear.blocks.end(), BlockKind::kFrameTime);
+  if (times == linear.blocks.end()) return;
+  const auto first = static_cast<size_t>(times - linear.blocks.begin());
+  s->by_times.resize(s->r.size(), 2);
+  s->by_times << linear.factor.J[first], linear.factor.J[first + 1];
 }
 
-// What is the pair's own: direction, bend, and noise of the rates as PairGraph has it, its means
-// over some samples (of attitudes: each).
+// What is the pair's own: direction, bend, the frames' times, and noise of the rates as PairGraph
+// has it, its means over some samples (of attitudes: each).
 void FillOwn(const PairResidual& residual, const LinearPair& linear, const TimedPair& pair,
              const Calibration& c, const AllEffects& all, const PairGraphOptions& options,
              PairSystem* s) {
@@ -121,17 +133,26 @@ void FillOwn(const PairResidual& residual, const LinearPair& linear, const Timed
   const Eigen::Index step =
       residual.facts().of_attitudes ? 1 : options.RateStep(interval_s, c.lens[kFocal]);
   const Eigen::Index values = (samples + step - 1) / step;
-  const Eigen::Index own = residual.facts().has_direction ? 8 : 0;
+  const Eigen::Index of_direction = residual.facts().has_direction ? 8 : 0;
+  const bool with_times = all.frame_time_spread_s > 0.0 && s->by_times.cols() > 0;
+  const Eigen::Index own = of_direction + (with_times ? 2 : 0);
+  s->first_of_gyro = own;
   s->N.setZero(s->r.size(), own + 3 * values);
   s->prior.setZero(s->N.cols());
   s->at.setZero(s->N.cols());
-  if (own > 0) {
+  if (of_direction > 0) {
     const Eigen::Vector3d u = linear.plane.tau.unitOrthogonal(), v = linear.plane.tau.cross(u);
     s->N.col(0) = linear.J(BlockKind::kDirection) * u;
     s->N.col(1) = linear.J(BlockKind::kDirection) * v;
     s->N.middleCols<6>(2) = linear.J(BlockKind::kBend);
     s->prior.segment<6>(2) = linear.view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
     s->at.segment<6>(2) = linear.plane.bend;
+  }
+  if (with_times) {
+    s->times_column = static_cast<int>(of_direction);
+    s->N.middleCols<2>(of_direction) = s->by_times;
+    s->prior.segment<2>(of_direction).setConstant(std::pow(all.frame_time_spread_s, -2.0));
+    s->at.segment<2>(of_direction) << m.frame_a.offset_s, m.frame_b.offset_s;
   }
   for (Eigen::Index k = 0; k < values; ++k) {
     const Eigen::Index count = std::min(step, samples - k * step);
@@ -141,7 +162,7 @@ void FillOwn(const PairResidual& residual, const LinearPair& linear, const Timed
     s->prior.segment<3>(own + 3 * k) =
         static_cast<double>(count) * options.gyro_sigma_rad_s.cwiseAbs2().cwiseInverse();
   }
-  if (own > 0 && all.free_turn_rad_s > 0.0) {
+  if (of_direction > 0 && all.free_turn_rad_s > 0.0) {
     s->bend_column = 2;
     s->free_bend = BendSigma(all.free_turn_rad_s, c.readout_s, pair.time_b_s - pair.time_a_s)
                        .cwiseAbs2()
@@ -166,6 +187,7 @@ AllEffects AllEffectsOf(const Calibration& calibration, const EffectSet* candida
   if (candidates != nullptr) all.free_turn_rad_s = candidates->widened_sigma(PairLatent::kTurn);
   all.values = Eigen::VectorXd::Zero(set->size());
   if (present > 0) all.values.head(present) = calibration.effect_values;
+  all.frame_time_spread_s = calibration.pair_effects().frame_time_spread_s();
   all.set = set;
   return all;
 }

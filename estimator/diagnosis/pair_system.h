@@ -19,6 +19,10 @@ struct AllEffects {
   std::shared_ptr<const EffectSet> set;
   Eigen::VectorXd values;
   double free_turn_rad_s = 0.0;  // what candidates widen the prior of the turn to; 0: none does
+  // Of the frames' own times around their stamps, in the model [s]; 0: they have none there.
+  double frame_time_spread_s = 0.0;
+  // PairSystem::by_times is wanted although the model has them not.
+  bool with_times = false;
 };
 AllEffects AllEffectsOf(const Calibration& calibration, const EffectSet* candidates);
 
@@ -30,6 +34,11 @@ struct PairSystem {
   Eigen::VectorXd at;     // where they are
   int bend_column = -1;   // of N, where a candidate frees the bend; -1: none does
   BendVector free_bend;   // 1 / sigma^2 of a bend that is free
+  int times_column = -1;  // of N, of the two frames' own times; -1: they have none in the model
+  Eigen::Index first_of_gyro = 0;  // of N: columns of the gyro's noise, up to the last
+  // Derivatives by the offsets of the two frames from their stamps [1/s], where they are in the
+  // model or AllEffects wants them; else no columns.
+  Eigen::MatrixXd by_times;
 };
 
 // False where the gyro does not cover the pair, or it has too few matches or no value. noise: of a

@@ -192,6 +192,7 @@ Scores MergeShares(const Scores& first, const Scores& second) {
     sum.pairs += block.pairs;
     sum.residuals += block.residuals;
     sum.chi2 += block.chi2;
+    sum.log_det += block.log_det;
     sum.g += block.g;
     sum.H += block.H;
   }

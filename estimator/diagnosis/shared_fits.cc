@@ -79,7 +79,9 @@ std::vector<double> Fall(const Scores& before, const Scores& after) {
   std::vector<double> fall;
   for (const BlockScore& b : before.blocks) {
     for (const BlockScore& a : after.blocks) {
-      if (a.time_s == b.time_s && a.pairs == b.pairs) fall.push_back(b.chi2 - a.chi2);
+      if (a.time_s == b.time_s && a.pairs == b.pairs) {
+        fall.push_back(b.chi2 + b.log_det - a.chi2 - a.log_det);
+      }
     }
   }
   return fall;

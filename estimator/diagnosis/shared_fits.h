@@ -50,7 +50,7 @@ class SharedFits {
 
 // Sum over the blocks.
 double Chi2Of(const Scores& scores);
-// Fall of chi2 by block; blocks that one of the two could not evaluate count nothing.
+// Fall of chi2 + log_det by block; blocks that one of the two could not evaluate count nothing.
 std::vector<double> Fall(const Scores& before, const Scores& after);
 
 }  // namespace camgyro

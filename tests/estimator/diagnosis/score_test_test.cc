@@ -53,7 +53,7 @@ Scores LinearScores(uint64_t seed, const Eigen::VectorXd& truth, double correlat
   return scores;
 }
 
-Eigen::VectorXd Prior() { return Eigen::VectorXd::Constant(kStateSize + 3, 1e-4); }
+Eigen::VectorXd WeakPrior() { return Eigen::VectorXd::Constant(kStateSize + 3, 1e-4); }
 const std::vector<int> kCandidates = {kStateSize, kStateSize + 1, kStateSize + 2};
 
 TEST(ScoreTest, TailsAreThoseOfTheTables) {
@@ -99,7 +99,7 @@ TEST(ScoreTest, IsUniformUnderTheModelWhateverTheState) {
   double mean = 0.0;
   constexpr int kRuns = 200;
   for (int seed = 0; seed < kRuns; ++seed) {
-    const ScoreTest test = TestColumns(LinearScores(seed, truth), kCandidates, Prior());
+    const ScoreTest test = TestColumns(LinearScores(seed, truth), kCandidates, WeakPrior());
     EXPECT_EQ(test.dof, 3);
     below += test.p_value < 0.1 ? 1 : 0;
     mean += test.p_value / kRuns;
@@ -113,7 +113,7 @@ TEST(ScoreTest, IsUniformUnderTheModelWhateverTheState) {
 TEST(ScoreTest, FindsAnEffectWithItsSize) {
   Eigen::VectorXd truth = Eigen::VectorXd::Zero(kStateSize + 3);
   truth[kStateSize + 1] = 0.1;  // sigma 0.012
-  const ScoreTest test = TestColumns(LinearScores(1, truth), kCandidates, Prior());
+  const ScoreTest test = TestColumns(LinearScores(1, truth), kCandidates, WeakPrior());
   EXPECT_LT(test.p_value, 1e-6);
   EXPECT_NEAR(test.estimate[1], 0.1, 4.0 * std::sqrt(test.covariance(1, 1)));
   EXPECT_NEAR(std::sqrt(test.covariance(1, 1)), 0.012, 0.003);
@@ -124,7 +124,7 @@ TEST(ScoreTest, InflatesForWhatBlocksHaveInCommon) {
   const Eigen::VectorXd truth = Eigen::VectorXd::Zero(kStateSize + 3);
   int below = 0;
   for (int seed = 0; seed < 100; ++seed) {
-    const ScoreTest test = TestColumns(LinearScores(seed, truth, 0.1), {kStateSize}, Prior());
+    const ScoreTest test = TestColumns(LinearScores(seed, truth, 0.1), {kStateSize}, WeakPrior());
     EXPECT_GT(test.inflation, 1.5);
     below += test.p_value < 0.05 ? 1 : 0;
   }
@@ -166,10 +166,10 @@ TEST(ScoreTest, TellsMoreOnceTheUsualScatterIsKnown) {
   double alone = 0.0, moderated = 0.0;  // mean log10 p
   for (int seed = 0; seed < 100; ++seed) {
     const Scores clean = LinearScores(seed, Eigen::VectorXd::Zero(kStateSize + 3));
-    below += TestColumns(clean, {kStateSize}, Prior(), usual).p_value < 0.05 ? 1 : 0;
+    below += TestColumns(clean, {kStateSize}, WeakPrior(), usual).p_value < 0.05 ? 1 : 0;
     const Scores scores = LinearScores(seed, truth);
-    alone += std::log10(TestColumns(scores, {kStateSize}, Prior()).p_value) / 100.0;
-    moderated += std::log10(TestColumns(scores, {kStateSize}, Prior(), usual).p_value) / 100.0;
+    alone += std::log10(TestColumns(scores, {kStateSize}, WeakPrior()).p_value) / 100.0;
+    moderated += std::log10(TestColumns(scores, {kStateSize}, WeakPrior(), usual).p_value) / 100.0;
   }
   EXPECT_LT(below, 12);  // 5 expected
   EXPECT_LT(moderated, alone - 0.7);
@@ -183,7 +183,7 @@ TEST(ScoreTest, FindsTheTimeOfAStepOfTheDelay) {
     pair.g.head(kStateSize) -= change;
     scores.blocks[static_cast<size_t>(pair.block)].g.head(kStateSize) -= change;
   }
-  const StepSearch found = SearchDelayStep(scores, Prior(), 1.0, {1.0, 50.0});
+  const StepSearch found = SearchDelayStep(scores, WeakPrior(), 1.0, {1.0, 50.0});
   EXPECT_LT(found.test.p_value, 1e-4);
   EXPECT_NEAR(found.time_s, 7.25, 0.5);
   EXPECT_NEAR(found.test.estimate[0], 0.4, 0.1);
@@ -193,19 +193,19 @@ TEST(ScoreTest, AFalseStepIsNotSignificant) {
   int found = 0;
   for (int seed = 0; seed < 60; ++seed) {
     const Scores scores = LinearScores(seed, Eigen::VectorXd::Zero(kStateSize + 3));
-    found += SearchDelayStep(scores, Prior(), 1.0).test.p_value < 0.05 ? 1 : 0;
+    found += SearchDelayStep(scores, WeakPrior(), 1.0).test.p_value < 0.05 ? 1 : 0;
   }
   EXPECT_LE(found, 9);  // 3 expected
 }
 
 TEST(ScoreTest, KnowsWhatCannotBeToldApart) {
   Scores scores = LinearScores(7, Eigen::VectorXd::Zero(kStateSize + 3));
-  EXPECT_LT(AliasOf(scores, {kStateSize}, {kStateSize + 1}, Prior()), 0.3);
+  EXPECT_LT(AliasOf(scores, {kStateSize}, {kStateSize + 1}, WeakPrior()), 0.3);
   for (BlockScore& block : scores.blocks) {  // the second candidate is twice the first
     block.H.col(kStateSize + 1) = 2.0 * block.H.col(kStateSize);
     block.H.row(kStateSize + 1) = 2.0 * block.H.row(kStateSize);
   }
-  EXPECT_GT(AliasOf(scores, {kStateSize}, {kStateSize + 1}, Prior()), 0.999);
+  EXPECT_GT(AliasOf(scores, {kStateSize}, {kStateSize + 1}, WeakPrior()), 0.999);
 }
 
 }  // namespace
