@@ -35,6 +35,19 @@ std::vector<Candidate> MissingEffects(const Calibration& model, const EffectSetu
   return candidates;
 }
 
+std::vector<Candidate> MissingFrameTimes(const Calibration& model, const EffectSetup& setup) {
+  std::vector<Candidate> candidates;
+  if (model.pair_effects().frame_time_spread_s() > 0.0) return candidates;
+  for (const EffectEntry& entry : EffectCatalogue()) {
+    for (const std::string& shape : entry.shapes(setup)) {
+      std::shared_ptr<const Effect> effect = entry.make(setup, shape);
+      if (effect == nullptr || !effect->frees_frame_times()) continue;
+      candidates.push_back({&entry, shape, std::move(effect), 0});
+    }
+  }
+  return candidates;
+}
+
 void AddEffect(const Candidate& candidate, Calibration* calibration) {
   auto set = std::make_shared<EffectSet>();
   std::vector<double> values;

@@ -27,14 +27,20 @@ struct Candidate {
   }
   // Instead of having parameters, it frees what pairs of frames have of their own.
   bool widens_prior() const { return effect->widens_prior(); }
+  // It explains whatever changes from frame to frame: what other effects do, too. So it is asked
+  // only where none of these is left to add.
+  bool is_last_resort() const { return effect->frees_frame_times(); }
   // Between rivals that gain alike, the smaller one wins: parameters, or more than any effect has
   // of them for one that frees some in every pair.
   int complexity() const { return widens_prior() ? 1000 : effect->size(); }
 };
 
 // Effects that the model has not, or only in a shape with fewer parameters; without those whose
-// shape is a time, which is searched (EffectEntry::step_at).
+// shape is a time, which is searched (EffectEntry::step_at), and those that free the frames' times.
 std::vector<Candidate> MissingEffects(const Calibration& model, const EffectSetup& setup);
+// Those that do (Effect::frees_frame_times), which have a test of their own; none if the frames'
+// times are free in the model.
+std::vector<Candidate> MissingFrameTimes(const Calibration& model, const EffectSetup& setup);
 
 // The model's effects and one more; another shape of the same effect takes its place, unless
 // they add up. Values carry over.

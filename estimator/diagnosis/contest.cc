@@ -54,12 +54,23 @@ class Contest {
     return ContestResult{rivals_[winner].at, std::move(rivals_[winner].fit)};
   }
 
+  std::optional<ContestResult> RunLastResort() {
+    for (size_t i = 0; i < all_.size(); ++i) {
+      if (!all_[i].candidate.is_last_resort() || !all_[i].result.rejected.empty()) continue;
+      if (std::optional<Rival> rival = RefitRival(i)) {
+        return ContestResult{i, std::move(rival->fit)};
+      }
+    }
+    return std::nullopt;
+  }
+
  private:
   // Contestants from *next on that are refitted whatever comes of those before them here: with
   // each, there is at most one rival more. *next becomes the first of the others.
   std::vector<size_t> NextTogether(size_t* next) {
     std::vector<size_t> together;
     for (; *next < all_.size(); ++*next) {
+      if (all_[*next].candidate.is_last_resort()) continue;
       CandidateResult& r = all_[*next].result;
       const bool in_any_case = TriedInAnyCase(*all_[*next].candidate.entry);
       const bool widens = all_[*next].candidate.widens_prior();
@@ -208,6 +219,12 @@ std::optional<ContestResult> RunContest(const ContestSetting& setting,
                                         std::vector<Contestant>* contestants) {
   if (contestants->empty()) return std::nullopt;
   return Contest(setting, contestants).Run();
+}
+
+std::optional<ContestResult> RunLastResort(const ContestSetting& setting,
+                                           std::vector<Contestant>* contestants) {
+  if (contestants->empty()) return std::nullopt;
+  return Contest(setting, contestants).RunLastResort();
 }
 
 std::string Implausible(const Calibration& fit, double start_focal_px) {

@@ -37,6 +37,11 @@ struct ContestResult {
 std::optional<ContestResult> RunContest(const ContestSetting& setting,
                                         std::vector<Contestant>* contestants);
 
+// Of effects that are a last resort (Candidate::is_last_resort), which RunContest leaves alone: the
+// first that is not rejected, refitted. Nothing if there is none, or its refit speaks against it.
+std::optional<ContestResult> RunLastResort(const ContestSetting& setting,
+                                           std::vector<Contestant>* contestants);
+
 // Why a fit cannot be right, by its last effect and by its focal length; empty: it can.
 std::string Implausible(const Calibration& fit, double start_focal_px);
 

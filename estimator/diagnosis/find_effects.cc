@@ -2,11 +2,13 @@
 // choose by unseen gain, report on frames that neither has seen.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/contest.h"
 #include "estimator/diagnosis/diagnose.h"
+#include "estimator/diagnosis/frame_time_test.h"
 #include "estimator/diagnosis/gain_rule.h"
 #include "estimator/diagnosis/shared_fits.h"
 #include "estimator/diagnosis/step_search.h"
@@ -129,6 +131,34 @@ void AddWidened(const RoundScores& round, std::vector<Contestant>* all) {
   }
 }
 
+// Frames' own times. What they gain is known by refit only.
+void AddFrameTimes(const SharedFits& fits, const Refined& now, const RoundScores& round,
+                   std::vector<Contestant>* all) {
+  if (!fits.in().graph.residual->facts().with_frame_times) return;
+  if (fits.in().recording->HasOnlyAttitudes()) return;
+  const std::vector<Candidate> missing = MissingFrameTimes(now.calibration, round.setup);
+  if (missing.empty()) return;
+  std::vector<TimedPair> far = Joined(fits.shares().fit);
+  const std::vector<TimedPair> choice = Joined(fits.shares().choice);
+  far.insert(far.end(), choice.begin(), choice.end());
+  const auto halves = [&](const std::vector<TimedPair>& pairs) {
+    return ScoreHalves(fits.input(), pairs, now.calibration, now.quality.noise_px, fits.in().graph);
+  };
+  const FrameTimeTest found =
+      TestFrameTimes(halves(fits.near_pairs()), halves(far), round.prior.head(round.fit.num_model));
+  ScoreTest test;
+  test.dof = 1;
+  test.statistic = std::pow(std::max(0.0, found.times.sigmas), 2);
+  test.p_value = found.times.p_value;
+  test.estimate = Eigen::VectorXd::Constant(1, found.spread.value_s);
+  test.covariance = Eigen::MatrixXd::Constant(1, 1, std::pow(found.spread.sigma_s, 2));
+  for (const Candidate& candidate : missing) {
+    all->push_back({MakeResult(candidate, test, {}), candidate});
+    all->back().result.start = test.estimate;
+    if (!found.is_of_times()) all->back().result.rejected = "not times of the frames' own";
+  }
+}
+
 // A sign that the effect cannot have: of a parameter whose range begins at zero, below it. Two
 // effects may be of opposite signs of one column (gyro_lowpass, exposure_lowpass): what is not
 // refitted leaves its place to other rivals.
@@ -144,6 +174,8 @@ void JudgeAndSort(double significance, std::vector<Contestant>* all) {
     r.significant = r.p_value * tests <= significance;
     if (!r.significant) {
       r.rejected = "not significant";
+    } else if (candidate.is_last_resort()) {
+      continue;
     } else if (HasWrongSign(r)) {
       r.rejected = r.parameter_info[0].name + " outside of what real devices show";
     } else if (!GainBearsOut(r, tests)) {
@@ -251,7 +283,8 @@ class Loop {
   // What is left over image, time, rates and so on.
   std::vector<StructureMap> Maps(const EffectSetup& setup) const {
     const Calibration& model = fit_.calibration;
-    const StructureMaps maps(setup, model.bias_gyro_rad_s);
+    const StructureMaps maps(setup, model.bias_gyro_rad_s,
+                             model.pair_effects().frame_time_spread_s() > 0.0);
     return maps.Evaluate(
         fits_.ScoresOf(fits_.map_pairs(), model, maps.set(), fit_.quality.noise_px),
         kStateSize + static_cast<int>(model.effect_values.size()),
@@ -271,6 +304,7 @@ class Loop {
     AddSteps(scores, fits_.shares().block_s, usual, &all);
     if (delay_moves) ReplaceByLargeStep(scores.setup, &all);
     AddWidened(scores, &all);
+    AddFrameTimes(fits_, fit_, scores, &all);
     JudgeAndSort(options_.significance, &all);
 
     bool added = false;
@@ -283,7 +317,9 @@ class Loop {
       setting.choice = &scores.choice;
       setting.first_round = round == 0;
       setting.delay_moves = delay_moves;
-      if (auto contest = RunContest(setting, &all)) {
+      std::optional<ContestResult> contest = RunContest(setting, &all);
+      if (!contest) contest = RunLastResort(setting, &all);
+      if (contest) {
         Take(*contest, &all, result);
         added = true;
       }
@@ -323,6 +359,11 @@ class Loop {
     result->after = Summarise(after, noise);
     result->report_gain = SumOf(Fall(before, after));
     fit_ = contest.fit;
+    for (auto& [r, candidate] : *all) {
+      if (&r != &chosen && candidate.is_last_resort() && r.rejected.empty()) {
+        r.rejected = "asked when no other effect is left";
+      }
+    }
     const auto at = all->begin() + static_cast<std::ptrdiff_t>(contest.winner);
     std::rotate(all->begin(), at, at + 1);
   }

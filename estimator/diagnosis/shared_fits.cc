@@ -18,6 +18,15 @@ SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
   const PairSelection near = SelectPairs(*in.recording, kNearGap);
   map_pairs_ = MakeShares(*in.recording, MakeEstimationInput(*in.recording, near)).choice;
   if (in.recording->HasOnlyAttitudes()) return;
+  // As far apart as the others, so that no two of them share noise.
+  const int stride = SelectPairs(*in.recording).stride;
+  Shares nearest =
+      MakeShares(*in.recording, MakeEstimationInput(*in.recording, {kNearestGap, stride}));
+  Thin(kMostFitPairs, &nearest.fit);
+  Thin(kMostFitPairs, &nearest.choice);
+  near_pairs_ = Joined(nearest.fit);
+  const std::vector<TimedPair> choice = Joined(nearest.choice);
+  near_pairs_.insert(near_pairs_.end(), choice.begin(), choice.end());
   Thin(kMostFitPairs, &shares_.fit);
   Thin(kMostChoicePairs, &shares_.choice);
   Thin(kMostChoicePairs, &map_pairs_);

@@ -23,6 +23,8 @@ class SharedFits {
   const Shares& shares() const { return shares_; }
   // The choice share's frames in pairs that are near.
   const std::vector<PairBlock>& map_pairs() const { return map_pairs_; }
+  // Pairs of near frames in the fit and the choice share.
+  const std::vector<TimedPair>& near_pairs() const { return near_pairs_; }
   // Stretches of the fit and the choice share together, those that have pairs, in time order.
   std::vector<PairBlock> SeenBlocks() const;
 
@@ -46,6 +48,7 @@ class SharedFits {
   const EstimationInput input_;
   Shares shares_;
   std::vector<PairBlock> map_pairs_;
+  std::vector<TimedPair> near_pairs_;
 };
 
 // Sum over the blocks.

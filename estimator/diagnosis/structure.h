@@ -32,7 +32,11 @@ struct StructureMap {
 // ComputeScores as candidates.
 class StructureMaps {
  public:
-  explicit StructureMaps(const EffectSetup& setup, const Eigen::Vector3d& bias_rad_s);
+  // frames_have_times: frames have times of their own in the model (frame_stamp_jitter). Then their
+  // stamps, and so the intervals between these, are off by the same amounts as the delay, and no
+  // map is made of the one over the other.
+  StructureMaps(const EffectSetup& setup, const Eigen::Vector3d& bias_rad_s,
+                bool frames_have_times);
   std::shared_ptr<const EffectSet> set() const { return set_; }
   // `first`: column of the set's first parameter in the scores.
   std::vector<StructureMap> Evaluate(const Scores& scores, int first,

@@ -224,7 +224,7 @@ class MapMaker {
   }
 
   // What comes with a frame: the interval before it, its exposure.
-  void AddFrames() {
+  void AddFrames(bool with_intervals) {
     std::vector<double> intervals, exposures;
     for (size_t i = 0; i < setup_.frames.size(); ++i) {
       const size_t next = std::max<size_t>(1, i);
@@ -233,7 +233,9 @@ class MapMaker {
         exposures.push_back(setup_.frames[i].exposure_s);
       }
     }
-    AddOverFrameValue("delay over the frame interval", "interval [s]", intervals);
+    if (with_intervals) {
+      AddOverFrameValue("delay over the frame interval", "interval [s]", intervals);
+    }
     if (exposures.size() == setup_.frames.size()) {
       AddOverFrameValue("delay over the exposure", "exposure [s]", exposures);
     }
@@ -310,7 +312,8 @@ class MapMaker {
 
 }  // namespace
 
-StructureMaps::StructureMaps(const EffectSetup& setup, const Eigen::Vector3d& bias_rad_s)
+StructureMaps::StructureMaps(const EffectSetup& setup, const Eigen::Vector3d& bias_rad_s,
+                             bool frames_have_times)
     : set_(std::make_shared<EffectSet>()) {
   MapMaker maker(setup, set_.get(), &maps_);
   if (setup.has_pixels) {
@@ -318,7 +321,7 @@ StructureMaps::StructureMaps(const EffectSetup& setup, const Eigen::Vector3d& bi
     maker.AddRows();
   }
   maker.AddTime();
-  if (maker.AddRates(bias_rad_s)) maker.AddFrames();
+  if (maker.AddRates(bias_rad_s)) maker.AddFrames(!frames_have_times);
 }
 
 }  // namespace camgyro

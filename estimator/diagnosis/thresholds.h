@@ -27,8 +27,10 @@ constexpr int kLeastFitPairs = 25, kLeastChoicePairs = 25;
 // its noise is projected out of the test. Time is spent on the refits.
 constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
 // Of the maps [frames]: what comes and goes within some frames is to be seen
-// (FindEffects.LeavesAPeriodicGlitchWithoutAName).
+// (FindEffects.NamesAPeriodicGlitchOfTheStamps).
 constexpr int kNearGap = 3;
+// Of the test of the frames' times [frames].
+constexpr int kNearestGap = 1;
 // Rounds of noise scale and solve in a share's fit; its estimate need not settle to the last digit.
 constexpr int kFitRounds = 4;
 // Of the robust loss where nothing of the recording is known yet: attitudes [rad], pixels [px].
@@ -93,6 +95,27 @@ constexpr double kLeastFrameScatter = 1.5, kFrameScatterP = 1e-6;
 // A misfit that comes and goes with time, for which a scan for a step of the delay and a refit are
 // spent: a walk loses less to the loss than a run.
 constexpr double kMisfitToScan = 2.0, kMisfitToScanP = 1e-3;
+
+// ---- Frames' own times (frame_time_test.cc; tests/diagnosis/frame_time_test_test.cc) ----
+
+// Choices of signs of the permutation test: its least p, 5e-5, is beyond what a candidate among
+// some thirty needs at a significance of 0.01.
+constexpr int kSignChoices = 20000;
+// Below, signs have too few choices to say anything at that level (2^25).
+constexpr size_t kLeastPairsOfHalves = 25;
+// Weak priors that keep pairs which turn fast from being all that is heard: of an offset [s], as
+// small as is worth finding, and of a rotation between two frames, over the time between them
+// [rad/s], some 0.1 px of it at 30 frames per second; and the largest offset [s], which is that of
+// the effect.
+constexpr double kTimesPriorS = 1e-3, kRestPriorRadS = 0.01, kMostTimesS = 30e-3;
+// What the halves have in common besides times is significant at this p; then the times need this
+// share of it all. A rotation about any axis, of gyro noise or of a picture that shakes, has two
+// thirds of it along the two frames' own rotations at most.
+constexpr double kRestP = 0.01, kLeastShareOfTimes = 0.75;
+// Spread of the offsets in pairs of near frames over that in pairs of far ones: 0.8 to 1 of stamps
+// that scatter, 0.1 of a delay that wanders within seconds, 0.2 (one frame over five) of a gyro's
+// error.
+constexpr double kLeastNearSpread = 0.5;
 
 // ---- What the verdict says beside effects ----
 

@@ -1,0 +1,237 @@
+#include "estimator/diagnosis/frame_time_test.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <utility>
+
+#include "core/parallel.h"
+#include "estimator/diagnosis/pair_system.h"
+#include "estimator/diagnosis/thresholds.h"
+
+namespace camgyro {
+namespace {
+
+using Matrix5d = Eigen::Matrix<double, 5, 5>;
+using Rows2 = Eigen::Matrix<double, 2, 5>;
+using Rows3 = Eigen::Matrix<double, 3, 5>;
+using Matrix5Xd = Eigen::Matrix<double, 5, Eigen::Dynamic>;
+
+TimedPair HalfOf(const TimedPair& pair, size_t which) {
+  TimedPair half = pair;
+  half.matches.clear();
+  for (size_t i = which; i < pair.matches.size(); i += 2) half.matches.push_back(pair.matches[i]);
+  return half;
+}
+
+// A half with what is the pair's own projected out, and how the gyro's noise, in sigmas, enters the
+// score of bias and offsets.
+struct Projected {
+  HalvesOfPair::Half half;
+  Matrix5Xd by_gyro;
+};
+
+Projected Project(const PairSystem& s) {
+  Eigen::MatrixXd J(s.J.rows(), s.J.cols() + 2);
+  J << s.J, s.by_times;
+  Eigen::MatrixXd A = s.N.transpose() * s.N;
+  A.diagonal() += s.prior;
+  A.diagonal().array() += 1e-9;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(A);
+  const Eigen::MatrixXd NJ = s.N.transpose() * J;
+  const Eigen::MatrixXd X = solver.solve(NJ);
+  Projected p;
+  p.half.g =
+      J.transpose() * s.r - X.transpose() * (s.N.transpose() * s.r + s.prior.cwiseProduct(s.at));
+  p.half.H = J.transpose() * J - NJ.transpose() * X;
+  // Noise n of the pair's own unknowns: r has N n, of which the projection leaves X^T prior n.
+  const Eigen::Index gyro = s.N.cols() - s.first_of_gyro;
+  Matrix5Xd left(5, gyro);
+  left.topRows<3>() = X.middleCols<3>(kStateBias).bottomRows(gyro).transpose();
+  left.bottomRows<2>() = X.rightCols<2>().bottomRows(gyro).transpose();
+  p.by_gyro = left * s.prior.tail(gyro).cwiseSqrt().asDiagonal();
+  return p;
+}
+
+std::optional<HalvesOfPair> HalvesOf(const EstimationInput& input, const TimedPair& pair,
+                                     const Calibration& calibration, const AllEffects& all,
+                                     double noise, const PairGraphOptions& options) {
+  HalvesOfPair both;
+  std::array<Projected, 2> projected;
+  for (size_t k = 0; k < 2; ++k) {
+    PairSystem system;
+    if (!MakePairSystem(input, HalfOf(pair, k), calibration, all, noise, options, &system)) {
+      return std::nullopt;
+    }
+    projected[k] = Project(system);
+    both.halves[k] = std::move(projected[k].half);
+  }
+  both.common = projected[0].by_gyro * projected[1].by_gyro.transpose();
+  return both;
+}
+
+// How the model's columns change with all pairs of one half.
+Eigen::VectorXd ModelStep(const std::vector<HalvesOfPair>& pairs, size_t half,
+                          const Eigen::VectorXd& prior) {
+  const Eigen::Index n = prior.size();
+  Eigen::MatrixXd H = prior.asDiagonal();
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
+  for (const HalvesOfPair& pair : pairs) {
+    H += pair.halves[half].H.topLeftCorner(n, n);
+    g += pair.halves[half].g.head(n);
+  }
+  const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd unit = scale.asDiagonal() * H * scale.asDiagonal();
+  unit.diagonal().array() += 1e-10;
+  return -scale.cwiseProduct(unit.ldlt().solve(scale.cwiseProduct(g)));
+}
+
+// Score and information of bias and offsets in one half, the model projected out of all pairs.
+struct Own {
+  Eigen::Matrix<double, 5, 1> s;
+  Matrix5d W;
+};
+
+Own OwnOf(const HalvesOfPair::Half& half, const Eigen::VectorXd& step) {
+  const Eigen::Index n = step.size();
+  const std::array<Eigen::Index, 5> at = {kStateBias, kStateBias + 1, kStateBias + 2, n, n + 1};
+  Own own;
+  for (Eigen::Index i = 0; i < 5; ++i) {
+    const Eigen::Index row = at[static_cast<size_t>(i)];
+    own.s[i] = half.g[row] + half.H.row(row).head(n).dot(step);
+    for (Eigen::Index k = 0; k < 5; ++k) own.W(i, k) = half.H(row, at[static_cast<size_t>(k)]);
+  }
+  return own;
+}
+
+// Of all pairs, the model's columns projected out of each half's sum.
+std::vector<std::array<Own, 2>> OwnOf(const std::vector<HalvesOfPair>& pairs,
+                                      const Eigen::VectorXd& prior) {
+  const std::array<Eigen::VectorXd, 2> steps = {ModelStep(pairs, 0, prior),
+                                                ModelStep(pairs, 1, prior)};
+  std::vector<std::array<Own, 2>> own;
+  for (const HalvesOfPair& pair : pairs) {
+    own.push_back({OwnOf(pair.halves[0], steps[0]), OwnOf(pair.halves[1], steps[1])});
+  }
+  return own;
+}
+
+// Both halves together. Frames of different pairs count as different ones.
+std::vector<PairTimes> WholePairs(const std::vector<std::array<Own, 2>>& own) {
+  std::vector<PairTimes> whole;
+  for (const auto& [a, b] : own) {
+    const auto frame = static_cast<int64_t>(2 * whole.size());
+    whole.push_back({frame, frame + 1, a.s.tail<2>() + b.s.tail<2>(),
+                     a.W.bottomRightCorner<2, 2>() + b.W.bottomRightCorner<2, 2>()});
+  }
+  return whole;
+}
+
+// Picks rotations out of bias and offsets, with whatever times there are projected out.
+Rows3 WithoutTimes(const Own& own) {
+  Eigen::Matrix2d W = own.W.bottomRightCorner<2, 2>();
+  W.diagonal().array() += std::pow(kMostTimesS, -2.0);
+  Rows3 T = Rows3::Zero();
+  T.leftCols<3>().setIdentity();
+  T.rightCols<2>() = -W.ldlt().solve(own.W.bottomLeftCorner<2, 3>()).transpose();
+  return T;
+}
+
+Agreement Judge(const std::vector<double>& x) {
+  Agreement agreement;
+  double sum_sq = 0.0;
+  for (const double value : x) {
+    agreement.sum += value;
+    sum_sq += value * value;
+  }
+  if (x.size() < kLeastPairsOfHalves || !(sum_sq > 0.0)) return agreement;
+  agreement.sigmas = agreement.sum / std::sqrt(sum_sq);
+  std::mt19937_64 random(1);
+  int as_large = 0;
+  for (int choice = 0; choice < kSignChoices; ++choice) {
+    double sum = 0.0;
+    uint64_t bits = 0;
+    for (size_t i = 0; i < x.size(); ++i, bits >>= 1) {
+      if (i % 64 == 0) bits = random();
+      sum += (bits & 1) != 0 ? x[i] : -x[i];
+    }
+    if (sum >= agreement.sum) ++as_large;
+  }
+  agreement.p_value = (1.0 + as_large) / (1.0 + kSignChoices);
+  if (as_large == 0) {
+    const double z = std::max(0.0, agreement.sigmas);
+    agreement.p_value = std::min(agreement.p_value, std::exp(-0.5 * z * z));
+  }
+  return agreement;
+}
+
+// x of one pair in the columns that T, 5 x any, picks out of bias and offsets in each half.
+template <typename Transform, typename Prior>
+double InCommon(const Own& a, const Own& b, const Transform& T_a, const Transform& T_b,
+                const Prior& prior, const Matrix5d& common) {
+  using Small = Eigen::Matrix<double, Transform::RowsAtCompileTime, Transform::RowsAtCompileTime>;
+  Small W = 0.5 * (T_a * a.W * T_a.transpose() + T_b * b.W * T_b.transpose());
+  W.diagonal() += prior;
+  const Eigen::LDLT<Small> solver(W);
+  const Small C = T_a * common * T_b.transpose();
+  return (T_a * a.s).dot(solver.solve(T_b * b.s)) - solver.solve(C).trace();
+}
+
+}  // namespace
+
+std::vector<HalvesOfPair> ScoreHalves(const EstimationInput& input,
+                                      const std::vector<TimedPair>& pairs,
+                                      const Calibration& calibration, double noise,
+                                      const PairGraphOptions& options) {
+  AllEffects all = AllEffectsOf(calibration, nullptr);
+  all.with_times = true;
+  std::vector<std::optional<HalvesOfPair>> found(pairs.size());
+  ParallelFor(pairs.size(), [&](size_t i) {
+    found[i] = HalvesOf(input, pairs[i], calibration, all, noise, options);
+  });
+  std::vector<HalvesOfPair> halves;
+  for (auto& pair : found) {
+    if (pair) halves.push_back(*std::move(pair));
+  }
+  return halves;
+}
+
+bool FrameTimeTest::is_of_times() const {
+  if (rest.p_value < kRestP && far_times.sum < kLeastShareOfTimes * (far_times.sum + rest.sum)) {
+    return false;
+  }
+  return spread.value_s > kLeastNearSpread * far_spread.value_s;
+}
+
+FrameTimeTest TestFrameTimes(const std::vector<HalvesOfPair>& near,
+                             const std::vector<HalvesOfPair>& far,
+                             const Eigen::VectorXd& prior_information) {
+  FrameTimeTest test;
+  test.pairs = static_cast<int>(near.size());
+  const Eigen::Vector2d times_prior = Eigen::Vector2d::Constant(std::pow(kTimesPriorS, -2.0));
+  const Eigen::Vector3d rest_prior = Eigen::Vector3d::Constant(std::pow(kRestPriorRadS, -2.0));
+  Rows2 pick_times = Rows2::Zero();
+  pick_times.rightCols<2>().setIdentity();
+  std::vector<double> near_times, far_times, rest;
+  const auto near_own = OwnOf(near, prior_information), far_own = OwnOf(far, prior_information);
+  for (size_t i = 0; i < near.size(); ++i) {
+    const auto& [a, b] = near_own[i];
+    near_times.push_back(InCommon(a, b, pick_times, pick_times, times_prior, near[i].common));
+  }
+  for (size_t i = 0; i < far.size(); ++i) {
+    const auto& [a, b] = far_own[i];
+    far_times.push_back(InCommon(a, b, pick_times, pick_times, times_prior, far[i].common));
+    rest.push_back(InCommon(a, b, WithoutTimes(a), WithoutTimes(b), rest_prior, far[i].common));
+  }
+  test.times = Judge(near_times);
+  test.far_times = Judge(far_times);
+  test.rest = Judge(rest);
+  test.spread = MostLikelySpread(WholePairs(near_own));
+  test.far_spread = MostLikelySpread(WholePairs(far_own));
+  return test;
+}
+
+}  // namespace camgyro
