@@ -26,10 +26,11 @@ DECLARE_bool(quiet);
 DEFINE_int32(
     keyframes, 16,
     "keyframes in the sliding window, 6 to 60: more are slower and a little more accurate");
-DEFINE_double(gravity, 9.80665, "length of gravity where the recording was made [m/s^2]");
-DEFINE_string(lever_arm, "0,0,0",
-              "position of the camera in the gyro's frame, as far as it is known: x,y,z [m]");
-DEFINE_double(lever_arm_sigma, 0.05, "how well it is known, per axis [m]");
+DEFINE_double(gravity, 0.0,
+              "length of gravity where the recording was made [m/s^2]; without: 9.80665");
+DEFINE_string(lever_arm_mm, "0,0,0",
+              "position of the camera in the gyro's frame, as far as it is known: x,y,z");
+DEFINE_double(lever_arm_sigma_mm, 50.0, "how well it is known, per axis");
 
 namespace camgyro {
 namespace {
@@ -40,21 +41,22 @@ Result<OdometryOptions> OptionsFromFlags() {
     return BadUsage("--keyframes: expected 6 to 60");
   }
   options.keyframes = FLAGS_keyframes;
-  if (!(FLAGS_gravity > 9.0 && FLAGS_gravity < 10.5)) {
+  if (FLAGS_gravity != 0.0) options.gravity_m_s2 = FLAGS_gravity;
+  if (!(options.gravity_m_s2 > 9.0 && options.gravity_m_s2 < 10.5)) {
     return BadUsage("--gravity: expected 9 to 10.5 m/s^2");
   }
-  options.gravity_m_s2 = FLAGS_gravity;
-  std::istringstream words(FLAGS_lever_arm);
+  std::istringstream words(FLAGS_lever_arm_mm);
   char comma = ',', second = ',';
   Eigen::Vector3d& arm = options.p_gyro_cam_m;
   if (!(words >> arm.x() >> comma >> arm.y() >> second >> arm.z()) || comma != ',' ||
       second != ',' || !(words >> std::ws).eof() || !arm.allFinite()) {
-    return BadUsage("--lever_arm=" + FLAGS_lever_arm + ": expected x,y,z in metres");
+    return BadUsage("--lever_arm_mm=" + FLAGS_lever_arm_mm + ": expected x,y,z in mm");
   }
-  if (!(FLAGS_lever_arm_sigma > 0.0 && FLAGS_lever_arm_sigma <= 10.0)) {
-    return BadUsage("--lever_arm_sigma: expected more than 0, at most 10 m");
+  arm *= 1e-3;
+  if (!(FLAGS_lever_arm_sigma_mm > 0.0 && FLAGS_lever_arm_sigma_mm <= 1e4)) {
+    return BadUsage("--lever_arm_sigma_mm: expected more than 0, at most 10000");
   }
-  options.p_gyro_cam_sigma_m = FLAGS_lever_arm_sigma;
+  options.p_gyro_cam_sigma_m = 1e-3 * FLAGS_lever_arm_sigma_mm;
   return options;
 }
 
@@ -171,8 +173,8 @@ Command OdometryCommand() {
       "where the device went: positions, velocities and biases of a recording with an "
       "accelerometer, by a sliding window that knows the rolling shutter and both clocks; without "
       "--calibration the recording is calibrated first";
-  command.flags = {"calibration", "out",     "effects",   "device",
-                   "keyframes",   "gravity", "lever_arm", "lever_arm_sigma"};
+  command.flags = {"calibration", "out",     "effects",      "device",
+                   "keyframes",   "gravity", "lever_arm_mm", "lever_arm_sigma_mm"};
   for (const std::string& flag : InputFlags()) command.flags.push_back(flag);
   command.flags.emplace_back("quiet");
   command.run = RunOdometry;

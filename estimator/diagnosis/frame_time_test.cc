@@ -140,8 +140,8 @@ Rows3 WithoutTimes(const Own& own) {
   return T;
 }
 
-Agreement Judge(const std::vector<double>& x) {
-  Agreement agreement;
+HalvesAgreement Judge(const std::vector<double>& x) {
+  HalvesAgreement agreement;
   double sum_sq = 0.0;
   for (const double value : x) {
     agreement.sum += value;

@@ -40,10 +40,10 @@ std::vector<HalvesOfPair> ScoreHalves(const EstimationInput& input,
                                       const Calibration& calibration, double noise,
                                       const PairGraphOptions& options);
 
-// Agreement of halves in some columns: the sum over pairs of x = s1 . A s2 - E[s1 . A s2], with s1
-// and s2 the halves' scores, the model projected out of all pairs of each half on its own, A the
-// inverse of their mean information and a weak prior's, and E by the gyro's noise alone.
-struct Agreement {
+// HalvesAgreement of halves in some columns: the sum over pairs of x = s1 . A s2 - E[s1 . A s2],
+// with s1 and s2 the halves' scores, the model projected out of all pairs of each half on its own,
+// A the inverse of their mean information and a weak prior's, and E by the gyro's noise alone.
+struct HalvesAgreement {
   double sum = 0.0;  // chi2 that the halves have in common
   // sum / sqrt(sum of x^2)
   double sigmas = 0.0;
@@ -56,12 +56,12 @@ struct Agreement {
 
 struct FrameTimeTest {
   int pairs = 0;
-  Agreement times;
+  HalvesAgreement times;
   // In pairs of far frames, which tell rotations from the direction of translation: of times, and
   // of rotations between the two frames about any axis, times projected out. These are what gyro
   // noise, a picture that shakes or a model that is wrong otherwise bring; a time turns about the
   // axis of the camera's own rotation only.
-  Agreement far_times, rest;
+  HalvesAgreement far_times, rest;
   // Most likely standard deviation of the offsets, in pairs of near frames and of far ones. A gyro
   // whose error grows with its rate turns about the axis of the rotation, too, and a delay that
   // wanders shifts times: but both by as much less as the frames of a pair are nearer to each
