@@ -192,6 +192,65 @@ Result<VinsOptions> FromApi(const api::VinsSettings& s) {
   return options;
 }
 
+Result<OdometryOptions> FromApi(const api::OdometrySettings& s) {
+  const Result<VinsOptions> inertial = FromApi(s.inertial);
+  if (!inertial) return tl::unexpected(inertial.error());
+  for (const double density : {s.gyro_bias_walk_rad_s2_rtHz, s.accel_bias_walk_m_s3_rtHz}) {
+    if (!(density > 1e-12 && density < 1e3)) {
+      return BadUsage("odometry settings: expected random walks between 1e-12 and 1e3");
+    }
+  }
+  if (s.keyframes < 6 || s.keyframes > 60) {
+    return BadUsage("odometry settings: expected 6 to 60 keyframes");
+  }
+  OdometryOptions options;
+  options.noise = inertial->noise;
+  options.accel_bias_sigma_m_s2 = inertial->accel_bias_sigma_m_s2;
+  options.p_gyro_cam_m = inertial->p_gyro_cam_m;
+  options.p_gyro_cam_sigma_m = inertial->p_gyro_cam_sigma_m;
+  options.gravity_m_s2 = inertial->gravity_m_s2;
+  options.walk = {s.gyro_bias_walk_rad_s2_rtHz, s.accel_bias_walk_m_s3_rtHz};
+  options.keyframes = s.keyframes;
+  return options;
+}
+
+Result<Calibration> FromApi(const api::Calibration& c) {
+  api::CameraGuess as_guess;
+  as_guess.width_px = c.width_px;
+  as_guess.height_px = c.height_px;
+  as_guess.focal_px = c.focal_px;
+  as_guess.aspect_ratio = c.aspect_ratio;
+  as_guess.principal_px = c.principal_px;
+  as_guess.distortion_model = c.distortion_model;
+  as_guess.distortion = c.distortion;
+  as_guess.readout_s = c.readout_s;
+  as_guess.delay_s = c.delay_s;
+  as_guess.q_gyro_cam_wxyz = c.q_gyro_cam_wxyz;
+  const Result<CameraGuess> checked = FromApi(as_guess);
+  if (!checked) return tl::unexpected(checked.error());
+  if (!Finite(c.bias_gyro_rad_s)) return BadUsage("calibration: the gyro bias is not finite");
+  Calibration calibration;
+  calibration.width_px = c.width_px;
+  calibration.height_px = c.height_px;
+  calibration.lens = MakePinhole(c.focal_px, *checked->principal_px, c.aspect_ratio);
+  calibration.distortion_model = checked->distortion_model;
+  if (checked->distortion_model != DistortionModel::kNone) {
+    calibration.lens.segment<4>(FirstCoefficient(checked->distortion_model)) =
+        Eigen::Map<const Eigen::Vector4d>(c.distortion.data());
+  }
+  calibration.readout_s = c.readout_s;
+  calibration.delay_s = c.delay_s;
+  calibration.bias_gyro_rad_s = FromApi(c.bias_gyro_rad_s);
+  calibration.q_gyro_cam = *checked->q_gyro_cam;
+  calibration.covariance = Eigen::Map<const StateCovariance>(c.covariance.data());
+  const Eigen::Map<const StateCovariance> total(c.total_covariance.data());
+  if (total.allFinite() && !total.isZero()) calibration.total_covariance = total;
+  if (!calibration.covariance.allFinite()) {
+    return BadUsage("calibration: the covariance is not finite");
+  }
+  return calibration;
+}
+
 namespace api {
 
 const char* Version() noexcept {

@@ -4,12 +4,14 @@
 
 #include <string>
 
+#include "camgyro/odometry.h"
 #include "camgyro/types.h"
 #include "camgyro/vins.h"
 #include "core/calibration.h"
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/diagnosis/device_class.h"
+#include "estimator/odometry/odometry.h"
 #include "estimator/vins/initialise.h"
 
 namespace camgyro {
@@ -21,6 +23,9 @@ DeviceClass FromApi(api::Device device);
 // Errors: kBadUsage naming what is not finite or out of range.
 Result<CameraGuess> FromApi(const api::CameraGuess& guess);
 Result<VinsOptions> FromApi(const api::VinsSettings& settings);
+Result<OdometryOptions> FromApi(const api::OdometrySettings& settings);
+// With the total covariance, where it is known.
+Result<Calibration> FromApi(const api::Calibration& calibration);
 
 }  // namespace camgyro
 
