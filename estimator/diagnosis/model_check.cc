@@ -162,7 +162,7 @@ void ExplainHalves(const Tested& t, const Usual& u, CalibrationReport* report) {
       "%s (chi2 per parameter %.0f instead of 1, where effects of a "
       "usual device make %.0f",
       kHalvesDoubt, chi2, expected);
-  if (left > 1.0) {
+  if (std::sqrt(left) > kLeastFactorSaid) {
     doubts.push_back(found + Format("); all sigmas are multiplied by %.1f", std::sqrt(left)));
   } else {
     report->notes.push_back(found + "): see the error in all");
@@ -186,8 +186,8 @@ void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
 }
 
 // The most significant candidate, if it is so beyond doubt.
-std::optional<std::string> Suspect(const Tested& t, const std::vector<ScoreTest>& alone,
-                                   const Scatter& usual) {
+std::optional<std::string> Suspect(const Tested& t, const Calibration& model,
+                                   const std::vector<ScoreTest>& alone, const Scatter& usual) {
   const Candidate* best = nullptr;
   double best_p = 1.0;
   for (size_t i = 0; i < t.candidates.size(); ++i) {
@@ -200,10 +200,15 @@ std::optional<std::string> Suspect(const Tested& t, const std::vector<ScoreTest>
   }
   best_p *= static_cast<double>(t.candidates.size());
   if (best == nullptr || best_p > kNoDoubt) return std::nullopt;
+  // An effect that is fitted already can only be of another shape.
+  const bool is_fitted = model.effects && model.effects->Has(best->entry->name);
+  const std::string like = is_fitted ? Format("%s of another shape than is fitted (%s)",
+                                              best->entry->name.c_str(), best->shape.c_str())
+                                     : best->entry->name + ": " + best->entry->explanation;
   return Format(
-      "the pictures show something that the model lacks (p = %.0e), first of all like %s: %s; "
+      "the pictures show something that the model lacks (p = %.0e), first of all like %s; "
       "camgyro diagnose finds out what it is, or name it in --effects",
-      std::max(best_p, 1e-99), best->entry->name.c_str(), best->entry->explanation.c_str());
+      std::max(best_p, 1e-99), like.c_str());
 }
 
 }  // namespace
@@ -225,7 +230,7 @@ std::optional<std::string> CheckModel(const Recording& recording, const Calibrat
     ExplainHalves(t, effects, report);
     AddTotal(t, effects, report);
   }
-  return Suspect(t, alone, usual);
+  return Suspect(t, report->calibration, alone, usual);
 }
 
 }  // namespace camgyro

@@ -122,6 +122,9 @@ constexpr double kLeastNearSpread = 0.5;
 // Sigmas beyond which the fit bears out an effect that the start has put into the model.
 constexpr double kSeenSigmas = 3.0;
 
+// A factor of the sigmas below this one is no doubt, and would be printed as 1.0 (model_check.cc).
+constexpr double kLeastFactorSaid = 1.05;
+
 // Canonical correlation of two effects beyond which this motion cannot tell them apart, and how
 // many more parameters one may have: a flexible curve contains simpler effects (candidates.cc).
 constexpr double kAliasLimit = 0.95;

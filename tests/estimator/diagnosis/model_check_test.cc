@@ -23,7 +23,8 @@ struct Calibrated {
 };
 
 // From a start that is off the truth, without an online pass.
-Calibrated Check(const std::vector<std::string>& overrides, DeviceClass device) {
+Calibrated Check(const std::vector<std::string>& overrides, DeviceClass device,
+                 const std::string& effects = "") {
   auto scenario = simulation::ParseScenario(
       "duration_s: 14\nmotion: {kind: walking}\ntracks: {count: 70, noise_px: 0.5}", overrides);
   EXPECT_TRUE(scenario) << scenario.error().message;
@@ -34,6 +35,7 @@ Calibrated Check(const std::vector<std::string>& overrides, DeviceClass device) 
   options.given_start->q_gyro_cam = c.simulated.truth.q_gyro_cam;
   c.simulated.recording.camera.focal_px = 1.02 * c.simulated.truth.lens[kFocal];
   options.online = false;
+  options.effects = effects;
   Result<CalibrationReport> report = CalibrateRecording(c.simulated.recording, nullptr, options);
   EXPECT_TRUE(report) << report.error().message;
   if (!report) return c;
@@ -136,6 +138,45 @@ TEST(ModelCheck, SaysThatTheLensIsNotAPinhole) {
       Check({"effects.radial_distortion={k1: -0.15, k2: 0.03}"}, DeviceClass::kPhone);
   ASSERT_TRUE(c.doubt.has_value());
   EXPECT_THAT(*c.doubt, HasSubstr("radial_distortion"));
+}
+
+// A wide lens, of which the series that is fitted explains a part: that it is the lens is known.
+TEST(ModelCheck, SaysThatAnEffectIsOfAnotherShape) {
+  const Calibrated c =
+      Check({"camera.focal_px=390", "tracks.count=100", "effects.radial_distortion.model=kb4",
+             "effects.radial_distortion.k1=0.02", "effects.radial_distortion.k2=-0.01"},
+            DeviceClass::kPhone, "radial_distortion:radtan");
+  ASSERT_TRUE(c.doubt.has_value());
+  EXPECT_THAT(*c.doubt,
+              HasSubstr("radial_distortion of another shape than is fitted (kannala_brandt)"));
+}
+
+// Halves that disagree by little more than usual effects make of it: the factor that is left is
+// nothing to doubt, and is not printed as 1.0.
+TEST(ModelCheck, AFactorOfOneIsNoDoubt) {
+  const Calibrated c = Check({"effects.clock_skew={ppm: 200}"}, DeviceClass::kPhone);
+  ASSERT_GT(c.report.halves_chi2, kHalvesLimit);  // so the covariance was multiplied
+  const StateCovariance of_noise = c.before / c.report.halves_chi2;
+  const double noise = of_noise.trace();
+  const auto with = [&](double chi2) {
+    CalibrationReport apart = c.report;
+    apart.halves_chi2 = chi2;
+    apart.calibration.covariance = chi2 * of_noise;
+    apart.doubts = {std::string(kHalvesDoubt) + " (by hand)"};
+    apart.systematic.clear();
+    apart.notes.clear();
+    CheckModel(c.simulated.recording, {}, DeviceClass::kPhone, &apart);
+    return apart;
+  };
+  // What is left of the covariance's factor says what is expected.
+  const double expected = 1000.0 / (with(1000.0).calibration.covariance.trace() / noise);
+  ASSERT_GT(1.08 * expected, kHalvesLimit);
+  const CalibrationReport little = with(1.08 * expected);
+  EXPECT_FALSE(SaysThatHalvesDisagree(little.doubts));
+  EXPECT_TRUE(SaysThatHalvesDisagree(little.notes));
+  EXPECT_NEAR(little.calibration.covariance.trace() / noise, 1.08, 1e-6);
+  const CalibrationReport more = with(1.5 * expected);
+  EXPECT_THAT(more.doubts, testing::Contains(HasSubstr("multiplied by 1.2")));
 }
 
 // Every row of the table is an effect that exists, in a shape that exists, with a size that is less
