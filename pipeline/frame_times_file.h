@@ -4,9 +4,11 @@
 #define CAMGYRO_PIPELINE_FRAME_TIMES_FILE_H_
 
 #include <string>
+#include <vector>
 
 #include "core/recording.h"
 #include "core/result.h"
+#include "estimator/window/frame_times.h"
 
 namespace camgyro {
 
@@ -16,6 +18,9 @@ namespace camgyro {
 // recording's frames is another recording's, and changes nothing. Errors: kBadInput with file and
 // line.
 Status ApplyFrameTimes(const std::string& calibration_path, Recording* recording);
+
+// The same with what a fit has found (CalibrationReport::frame_times). The recording has a gyro.
+void ApplyFrameTimes(const std::vector<FrameOffset>& frame_times, Recording* recording);
 
 }  // namespace camgyro
 

@@ -78,6 +78,7 @@ Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
       options, OnlineEstimator::kWindow, *device,
       [&](const std::string& stage, double done) { bar->Show(stage, done); }, recording);
   if (!run) return tl::unexpected(run.error());
+  ApplyFrameTimes(run->report.frame_times, recording);
   return run->report.calibration;
 }
 

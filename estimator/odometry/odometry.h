@@ -116,6 +116,11 @@ class Odometry {
   Status Begin(const VinsStart& start);
   std::optional<Anchor> DeadReckoned(int64_t time_ns) const;
   WindowPrior FirstPrior() const;
+  Eigen::Matrix4d PlaceCovariance(const std::optional<Anchor>& reckoned) const;
+  Result<std::vector<LandmarkSighting>> FillWindow(const VinsStart& start,
+                                                   const Eigen::Quaterniond& q_world_start,
+                                                   const Eigen::Vector3d& first_position,
+                                                   OdometryWindow* window) const;
   void Track(const QueuedFrame& frame);
   Status AddKeyframe(const QueuedFrame& frame, double parallax_rad);
   Status AfterSolve();

@@ -85,13 +85,9 @@ WindowPrior Odometry::FirstPrior() const {
   return prior;
 }
 
-Status Odometry::Begin(const VinsStart& start) {
-  const int64_t first_ns = start.states.front().time_ns;
-  std::optional<Anchor> reckoned;
-  if (anchor_) reckoned = DeadReckoned(first_ns);
-
-  // How well the place is known: exactly, since it is the world's origin; as dead reckoning knows
-  // it; or not at all.
+// Yaw and position of what is reckoned; of what is not, nothing is known, unless it is the world's
+// origin.
+Eigen::Matrix4d Odometry::PlaceCovariance(const std::optional<Anchor>& reckoned) const {
   Eigen::Matrix4d place = Eigen::Matrix4d::Zero();
   if (reckoned) {
     Eigen::Matrix<double, 4, kNavSize> J = Eigen::Matrix<double, 4, kNavSize>::Zero();
@@ -101,6 +97,48 @@ Status Odometry::Begin(const VinsStart& start) {
   } else if (anchor_) {
     place.diagonal() << M_PI * M_PI, Vector3d::Constant(kUnknownPlaceM * kUnknownPlaceM);
   }
+  return place;
+}
+
+// The start's keyframes, moved to where they are in our world, and the sightings of the last one.
+Result<std::vector<LandmarkSighting>> Odometry::FillWindow(const VinsStart& start,
+                                                           const Quaterniond& q_world_start,
+                                                           const Vector3d& first_position,
+                                                           OdometryWindow* window) const {
+  NavigationState biases;
+  biases.bias_gyro_rad_s = calibration_.bias_gyro_rad_s;  // the prior's
+  biases.bias_accel_m_s2 = start.bias_accel_m_s2;
+  int64_t before_ns = start.states.front().time_ns;
+  auto frame = starting_.begin();
+  std::vector<LandmarkSighting> sightings;
+  for (const VinsState& state : start.states) {
+    frame = std::find_if(frame, starting_.end(), [&](const QueuedFrame& candidate) {
+      return candidate.stamp_ns == state.frame_stamp_ns;
+    });
+    const auto imu = IntegralOver(before_ns, state.time_ns, biases);
+    if (frame == starting_.end() || !imu) return CannotEstimate("a frame of the start is gone");
+    NewKeyframe keyframe;
+    keyframe.frame_stamp_ns = frame->stamp_ns;
+    keyframe.time_ns = frame->time_ns;
+    keyframe.state = biases;
+    keyframe.state.q_world_gyro = q_world_start * state.q_world_gyro;
+    keyframe.state.p_world_m = first_position + q_world_start * state.p_world_m;
+    keyframe.state.v_world_m_s = q_world_start * state.v_world_m_s;
+    keyframe.sightings = sightings = SightingsOf(*frame, *imu, before_ns);
+    if (window->size() == 0) {
+      window->AddFirst(std::move(keyframe), FirstPrior());
+    } else {
+      keyframe.link = Link(*imu, before_ns, before_ns, frame->time_ns, biases);
+      window->Add(std::move(keyframe));
+    }
+    before_ns = frame->time_ns;
+  }
+  return sightings;
+}
+
+Status Odometry::Begin(const VinsStart& start) {
+  std::optional<Anchor> reckoned;
+  if (anchor_) reckoned = DeadReckoned(start.states.front().time_ns);
 
   // From the start's world, whose axes are those of its first keyframe, to ours.
   Quaterniond q_world_start =
@@ -119,34 +157,9 @@ Status Odometry::Begin(const VinsStart& start) {
   auto window = std::make_unique<OdometryWindow>(calibration_, options);
   noise_px_ = start.noise_px;
   window->set_noise_px(noise_px_);
-  NavigationState biases;
-  biases.bias_gyro_rad_s = calibration_.bias_gyro_rad_s;  // the prior's
-  biases.bias_accel_m_s2 = start.bias_accel_m_s2;
-  int64_t before_ns = first_ns;
-  auto frame = starting_.begin();
-  std::vector<LandmarkSighting> sightings;
-  for (const VinsState& state : start.states) {
-    frame = std::find_if(frame, starting_.end(), [&](const QueuedFrame& candidate) {
-      return candidate.stamp_ns == state.frame_stamp_ns;
-    });
-    const auto imu = IntegralOver(before_ns, state.time_ns, biases);
-    if (frame == starting_.end() || !imu) return CannotEstimate("a frame of the start is gone");
-    NewKeyframe keyframe;
-    keyframe.frame_stamp_ns = frame->stamp_ns;
-    keyframe.time_ns = frame->time_ns;
-    keyframe.state = biases;
-    keyframe.state.q_world_gyro = q_world_start * state.q_world_gyro;
-    keyframe.state.p_world_m = first_position + q_world_start * state.p_world_m;
-    keyframe.state.v_world_m_s = q_world_start * state.v_world_m_s;
-    keyframe.sightings = sightings = SightingsOf(*frame, *imu, before_ns);
-    if (state.time_ns == first_ns) {
-      window->AddFirst(std::move(keyframe), FirstPrior());
-    } else {
-      keyframe.link = Link(*imu, before_ns, before_ns, frame->time_ns, biases);
-      window->Add(std::move(keyframe));
-    }
-    before_ns = frame->time_ns;
-  }
+  const Result<std::vector<LandmarkSighting>> sightings =
+      FillWindow(start, q_world_start, first_position, window.get());
+  if (!sightings) return tl::unexpected(sightings.error());
   // The second solve is without the outliers of the first.
   for (int round = 0; round < 2; ++round) {
     if (Status solved = window->Solve(kFirstIterations); !solved) return solved;
@@ -154,7 +167,7 @@ Status Odometry::Begin(const VinsStart& start) {
   window_ = std::move(window);
   ++segment_;
   segment_begin_m_ = first_position;
-  segment_covariance_ = place;
+  segment_covariance_ = PlaceCovariance(reckoned);
   const size_t keyframes_before = keyframes_.size();
   if (Status sound = AfterSolve(); !sound) {
     window_.reset();
@@ -164,7 +177,7 @@ Status Odometry::Begin(const VinsStart& start) {
     start_explanation_ = sound.error().message;
     return sound;
   }
-  SetNewestDirections(sightings);
+  SetNewestDirections(*sightings);
   const WindowKeyframe newest = window_->newest();
   OdometryPose pose;
   pose.frame_stamp_ns = newest.frame_stamp_ns;
@@ -172,7 +185,7 @@ Status Odometry::Begin(const VinsStart& start) {
   pose.segment = segment_;
   pose.state = newest.state;
   pose.covariance = InWorld(newest.state, newest_covariance_);
-  for (const LandmarkSighting& seen : sightings) {
+  for (const LandmarkSighting& seen : *sightings) {
     pose.mapped_tracks += window_->IsMapped(seen.track_id);
   }
   poses_.push_back(pose);

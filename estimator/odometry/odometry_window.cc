@@ -155,14 +155,18 @@ bool OdometryWindow::Believable(const OdometryLandmark& landmark,
   return seen.dot(line.direction) > 1e-3 * seen.norm() && seen.norm() > 1e-4;
 }
 
+void OdometryWindow::DropUnbelievable(OdometryLandmark* landmark) const {
+  std::vector<OdometrySighting>& sightings = landmark->sightings;
+  sightings.erase(
+      std::remove_if(sightings.begin(), sightings.end(),
+                     [&](const OdometrySighting& s) { return !Believable(*landmark, s); }),
+      sightings.end());
+}
+
 void OdometryWindow::TriangulateNew() {
   for (auto& [track_id, landmark] : landmarks_) {
     if (landmark.known()) {
-      auto& sightings = landmark.sightings;
-      sightings.erase(
-          std::remove_if(sightings.begin(), sightings.end(),
-                         [&](const OdometrySighting& s) { return !Believable(landmark, s); }),
-          sightings.end());
+      DropUnbelievable(&landmark);
       continue;
     }
     std::vector<ViewingLine> lines;

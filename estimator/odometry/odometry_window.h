@@ -119,6 +119,7 @@ class OdometryWindow {
   void AddSightings(NewKeyframe* keyframe);
   ViewingLine LineOf(const OdometrySighting& sighting) const;
   bool Believable(const OdometryLandmark& landmark, const OdometrySighting& sighting) const;
+  void DropUnbelievable(OdometryLandmark* landmark) const;
   void TriangulateNew();
   void DropOutliersAndUpdateNoise(const Program& program);
   void Recentre();
