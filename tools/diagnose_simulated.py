@@ -332,8 +332,7 @@ def write_p_values(out, recordings):
     if not names:
         return
     out.write("Share of recordings in which the p-value of a candidate, not corrected for their "
-              "number, is below 0.5, 0.1, 0.05 and 0.01. (frame_stamp_jitter cannot be negative: "
-              "where no spread is likelier than any, its p is 1.)\n\n"
+              "number, is below 0.5, 0.1, 0.05 and 0.01.\n\n"
               "| Candidate | Recordings | < 0.5 | < 0.1 | < 0.05 | < 0.01 |\n"
               "| --- | --- | --- | --- | --- | --- |\n")
     for name in names:
