@@ -133,6 +133,8 @@ Files BagFolder() {
           {"first.db3", SqliteBytes(3, 7)}};
 }
 
+// One row per file.
+// NOLINTNEXTLINE(readability-function-size)
 const std::vector<FuzzTarget>& AllTargets() {
   static const std::vector<FuzzTarget> targets = {
       {"gyro_csv", "imu0/data.csv", "", TrackRecording, ReadAll},

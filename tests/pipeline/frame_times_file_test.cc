@@ -41,6 +41,12 @@ TEST_F(FrameTimesFileTest, GivesFramesTheTimesThatAFitHasWritten) {
   EXPECT_THAT(recording_.notes, ElementsAre(HasSubstr("3 of 4 frames have the times of")));
 }
 
+TEST_F(FrameTimesFileTest, GivesFramesTheTimesOfAFit) {
+  ApplyFrameTimes({{1'000, 20e-9, 3e-9}, {1'100, -30e-9, 3e-9}, {1'300, -150e-9, 3e-9}},
+                  &recording_);
+  EXPECT_THAT(Stamps(), ElementsAre(2'020, 2'070, 2'200, 2'201));
+}
+
 TEST_F(FrameTimesFileTest, LeavesOtherRecordingsAlone) {
   ASSERT_TRUE(ApplyFrameTimes(Path("calibration.yaml"), &recording_));  // there is no such file
   std::ofstream(Path("frame_times.csv")) << "#stamp_ns,repaired_stamp_ns,sigma_ns\n77,78,1\n";

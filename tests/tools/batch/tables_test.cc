@@ -76,7 +76,7 @@ TEST(BatchTables, OfADeviceWithoutACalibration) {
   BatchDevice device = Device();
   device.combined.reset();
   device.results = {device.results[1]};
-  EXPECT_EQ(DeviceCsv(device).find("\n"), DeviceCsv(device).size() - 1);  // the header alone
+  EXPECT_EQ(DeviceCsv(device).find('\n'), DeviceCsv(device).size() - 1);  // the header alone
   EXPECT_THAT(RecordingsCsv({device}), HasSubstr("phone/e,3,false"));
   EXPECT_THAT(DevicePage(device), HasSubstr("0 of 1 recordings"));
 }
