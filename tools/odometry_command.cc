@@ -108,6 +108,7 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
   if (Status writable = files.CheckWritable(); !writable) return writable;
   Result<Recording> recording = OpenRecording(arguments[0]);
   if (!recording) return tl::unexpected(recording.error());
+  if (Status sound = CheckCanBeFollowed(*recording); !sound) return sound;
   if (!FLAGS_quiet) {
     std::printf("%s: %s\n%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),
                 Notes("input", recording->notes).c_str());

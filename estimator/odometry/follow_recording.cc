@@ -68,10 +68,8 @@ OdometryOptions WithDeclaredNoise(OdometryOptions options, const GyroInfo& gyro)
   return options;
 }
 
-Result<OdometryRun> FollowRecording(const Recording& recording, const Calibration& calibration,
-                                    const OdometryOptions& options,
-                                    const std::function<void(double)>& progress) {
-  if (recording.tracks.empty()) {
+Status CheckCanBeFollowed(const Recording& recording) {
+  if (recording.tracks.empty() && !recording.HasImages()) {
     return BadInput(recording.path +
                     ": odometry needs pictures, or tracks of points with an identity");
   }
@@ -80,6 +78,14 @@ Result<OdometryRun> FollowRecording(const Recording& recording, const Calibratio
                     ": has no accelerometer; odometry needs one to know the scale and which way "
                     "is down");
   }
+  return {};
+}
+
+Result<OdometryRun> FollowRecording(const Recording& recording, const Calibration& calibration,
+                                    const OdometryOptions& options,
+                                    const std::function<void(double)>& progress) {
+  if (Status sound = CheckCanBeFollowed(recording); !sound) return tl::unexpected(sound.error());
+  if (recording.tracks.empty()) return BadInput(recording.path + ": its pictures are not tracked");
   Odometry odometry(calibration, options);
   Gathering gathering;
   size_t gyro = 0, accel = 0;

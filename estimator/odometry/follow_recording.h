@@ -28,8 +28,12 @@ struct OdometryRun {
 // Noise as the recording declares it, in the place of what the options say.
 OdometryOptions WithDeclaredNoise(OdometryOptions options, const GyroInfo& gyro);
 
+// Does the recording have what odometry needs? Asked before minutes of tracking and calibration;
+// pictures count, since they can be tracked. Error: kBadInput.
+Status CheckCanBeFollowed(const Recording& recording);
+
 // `progress` gets the share that is done and may be null. Errors: kBadInput for a recording without
-// tracks or without an accelerometer, or with samples that are not finite or not in order.
+// tracks, as CheckCanBeFollowed, or with samples that are not finite or not in order.
 Result<OdometryRun> FollowRecording(const Recording& recording, const Calibration& calibration,
                                     const OdometryOptions& options,
                                     const std::function<void(double)>& progress);

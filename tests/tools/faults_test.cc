@@ -19,7 +19,6 @@ namespace {
 using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
-using testing::Not;
 
 constexpr char kScenario[] =
     "duration_s: 5\nmotion: {kind: walking}\n"
