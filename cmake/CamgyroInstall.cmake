@@ -1,5 +1,7 @@
 # Install rules: the libraries and their headers for find_package(camgyro), and the program.
 include(GNUInstallDirs)
+# What has no component of its own is for those who build against the libraries (CamgyroPackages).
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 include(CMakePackageConfigHelpers)
 
 # Libraries under tools/ are parts of the program, and the simulator serves it and the tests.
@@ -23,7 +25,7 @@ install(FILES frontend/readers/read_recording.h frontend/readers/repair_stamps.h
 # libcamgyro and its headers, <camgyro/calibrator.h>. An export set of its own: a program that uses
 # only them needs none of what the static libraries need.
 install(TARGETS camgyro_camgyro EXPORT camgyroApiTargets
-        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev)
 get_target_property(api_headers camgyro_camgyro CAMGYRO_PUBLIC_HEADERS)
 foreach(header ${api_headers})
   if(header STREQUAL "version.h")
@@ -46,4 +48,4 @@ install(FILES ${PROJECT_SOURCE_DIR}/cmake/FindRosbagStorage.cmake
               ${PROJECT_BINARY_DIR}/camgyroConfigVersion.cmake
         DESTINATION ${package_dir})
 
-install(TARGETS camgyro RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS camgyro RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
