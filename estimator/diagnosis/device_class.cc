@@ -39,7 +39,7 @@ const std::vector<UsualEffect>& UsualEffects() {
       {"delay_wander",
        "curve",
        {2e-4, 1e-4, 5e-5},
-       "the tablets' delays move by some 0.2 ms from second to second (docs/lab/measured.md)"},
+       "assumed: of our recordings none tells it from other causes of a delay that moves"},
       {"readout_nonlinear",
        "bend",
        {1e-4, 1e-4, 5e-5},

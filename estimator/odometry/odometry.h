@@ -59,9 +59,9 @@ struct OdometryEvent {
 };
 
 // Feeds are in order within each stream; the streams may be interleaved in any way. What is known
-// is a function of what came in, whatever the interleaving. Memory is bounded by the window and by
-// the longest stretch that a start is looked for in. World frame: z up; origin and heading are the
-// first keyframe's.
+// is a function of what came in, whatever the interleaving. Memory is bounded by the window, by
+// the longest stretch that a start is looked for in, and by 20 s of inertial samples after a loss.
+// World frame: z up; origin and heading are the first keyframe's.
 class Odometry {
  public:
   // The calibration's covariance (the total one where it is known) is the prior of its values,
