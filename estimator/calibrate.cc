@@ -293,22 +293,13 @@ class CalibrationJob {
     return Refine(input_, refined_pairs_, from, report_.prior, options);
   }
 
-  // All pairs, and beside them each half alone.
-  Result<Refined> RefineWithHalves(const RefinementOptions& options, const Calibration& from,
-                                   const std::function<Result<Refined>()>& all,
-                                   Halves* halves) const {
-    if (static_cast<int>(refined_pairs_.size()) < kMinPairsForUnseen) return all();
-    HalvesFit fit(input_, refined_pairs_, from, report_.prior, options);
-    Result<Refined> refined = CannotEstimate("");
-    ParallelFor(3, [&](size_t which) {
-      if (which == 0) {
-        refined = all();
-      } else {
-        fit.Fit(which - 1);
-      }
-    });
-    *halves = fit.Compare();
-    return refined;
+  // Each half alone, from the fit of the whole: it is near, and a half that disagrees leaves it.
+  Halves FitHalves(RefinementOptions options, const Refined& whole) const {
+    if (static_cast<int>(refined_pairs_.size()) < kMinPairsForUnseen) return {};
+    options.graph.sigma = whole.quality.noise_px;
+    HalvesFit fit(input_, refined_pairs_, whole.calibration, report_.prior, options);
+    ParallelFor(2, [&](size_t half) { fit.Fit(half); });
+    return fit.Compare();
   }
 
   Status Refinement() {
@@ -319,7 +310,7 @@ class CalibrationJob {
           Format("the recording is long: %zu of %zu pairs, those that tell most, are refined",
                  refined_pairs_.size(), input_.pairs.size()));
     }
-    const RefinementOptions refinement = OptionsOfRefinement();
+    RefinementOptions refinement = OptionsOfRefinement();
     Calibration from = estimate_;
     if (from.effects != nullptr &&
         std::any_of(from.effects->items().begin(), from.effects->items().end(),
@@ -330,25 +321,15 @@ class CalibrationJob {
                return RefineWith(refinement, start, noise);
              }).calibration;
     }
-    RefinementOptions dropping = refinement;
-    dropping.graph.drop_without_ray = true;
-    Halves halves;
-    bool leads_nowhere = false;
-    const auto all = [&] {
-      Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
-      leads_nowhere = !refined && report_.online;  // a window that has run away, to a lens without
-      if (leads_nowhere) refined = RefineWith(refinement, from_start_, std::nullopt);  // rays
-      return refined;
-    };
-    Result<Refined> refined = RefineWithHalves(refinement, from, all, &halves);
-    if (leads_nowhere) {
+    Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
+    if (!refined && report_.online) {  // a window that has run away, to a lens without rays
+      refined = RefineWith(refinement, from_start_, std::nullopt);
       report_.notes.push_back(
           "the online estimate leads nowhere; all frames fitted from the start");
     }
     if (!refined && from.effects != nullptr) {
-      refined = RefineWithHalves(
-          dropping, from, [&] { return RefineWith(dropping, from, dropping.graph.sigma); },
-          &halves);
+      refinement.graph.drop_without_ray = true;
+      refined = RefineWith(refinement, from, refinement.graph.sigma);
       if (refined) {
         report_.notes.push_back(
             "matches where the lens of the start has no ray, at the edge of the picture, are left "
@@ -362,7 +343,7 @@ class CalibrationJob {
     report_.frame_times = refined->frame_times;
     report_.converged = refined->converged;
     Tell("refinement", 0.6);
-    TakeHalves(halves);
+    TakeHalves(FitHalves(refinement, *refined));
     clock_.Finish("refinement");
     return {};
   }

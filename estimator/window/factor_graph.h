@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -79,6 +80,9 @@ struct SolveOptions {
   // and by less than this: a cost that falls by 0.5 moves an estimate by a sigma, however many
   // factors there are.
   double cost_tolerance = std::numeric_limits<double>::infinity();
+  // Or as soon as this is true, if it is given: asked after each step that lowers the cost, with
+  // the values of that step in the graph.
+  std::function<bool()> settled = nullptr;
 };
 
 struct SolveReport {

@@ -11,14 +11,16 @@
 namespace camgyro {
 namespace {
 
-// Stops at the end of a step that lowered the cost by less than the tolerances allow.
-class StopAtCostTolerance final : public ceres::IterationCallback {
+// Stops at the end of a step that lowered the cost by less than the tolerances allow, or after
+// which the caller has seen enough.
+class StopWhenSettled final : public ceres::IterationCallback {
  public:
-  explicit StopAtCostTolerance(const SolveOptions& options) : options_(options) {}
+  explicit StopWhenSettled(const SolveOptions& options) : options_(options) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    const bool settled = summary.iteration > 0 && summary.step_is_successful &&
-                         summary.cost_change <= std::min(options_.function_tolerance * summary.cost,
-                                                         options_.cost_tolerance);
+    if (summary.iteration == 0 || !summary.step_is_successful) return ceres::SOLVER_CONTINUE;
+    const bool settled = summary.cost_change <= std::min(options_.function_tolerance * summary.cost,
+                                                         options_.cost_tolerance) ||
+                         (options_.settled && options_.settled());
     return settled ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
@@ -52,7 +54,8 @@ SolveReport FactorGraph::Solve(const SolveOptions& options) {
           std::min(options.function_tolerance, options.cost_tolerance / cost);
     }
   }
-  StopAtCostTolerance stop(options);
+  StopWhenSettled stop(options);
+  ceres_options.update_state_every_iteration = options.settled != nullptr;
   ceres_options.callbacks.push_back(&stop);
   ceres::Solver::Summary summary;
   ceres::Solve(ceres_options, problem_.get(), &summary);

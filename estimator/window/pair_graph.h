@@ -107,6 +107,10 @@ class PairGraph {
   // Errors: those of FactorGraph::Covariance, and kCannotEstimate without pairs.
   Status EstimateCovariance(double cluster_s, double inflation, Calibration* calibration) const;
 
+  // Of state and effects, in this order, as the factors alone have it: not widened. Errors: those
+  // of EstimateCovariance.
+  Result<Eigen::MatrixXd> NoiseCovariance() const;
+
   const FactorGraph& graph() const { return graph_; }
 
  private:
@@ -144,6 +148,8 @@ class PairGraph {
   PairParameters SharedParameters() const;
   PairParameters ParametersOf(int64_t id, const Pair& pair) const;
   PairTimes FrameTimesOf(const Pair& pair) const;
+  // State and effects as functionals of the blocks. Errors: kCannotEstimate without pairs.
+  Result<std::vector<FactorGraph::Functional>> StateFunctionals() const;
   // Beyond the exposures of a pair [s].
   double RateMargin() const;
 

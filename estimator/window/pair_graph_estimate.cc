@@ -113,11 +113,9 @@ Calibration PairGraph::Estimate() const {
   return c;
 }
 
-Status PairGraph::EstimateCovariance(double cluster_s, double inflation,
-                                     Calibration* calibration) const {
+Result<std::vector<FactorGraph::Functional>> PairGraph::StateFunctionals() const {
   const int num_effects = effects_ != nullptr ? effects_->size() : 0;
-  const int size = kStateSize + num_effects;
-  std::vector<FactorGraph::Functional> functionals(static_cast<size_t>(size));
+  std::vector<FactorGraph::Functional> functionals(static_cast<size_t>(kStateSize + num_effects));
   functionals[kStateFocal] = {{kLensBlock, 0}};
   functionals[kStateCx] = {{kLensBlock, 1}};
   functionals[kStateCy] = {{kLensBlock, 2}};
@@ -137,7 +135,24 @@ Status PairGraph::EstimateCovariance(double cluster_s, double inflation,
   for (int i = 0; i < num_effects; ++i) {
     functionals[static_cast<size_t>(kStateSize + i)] = {{kEffectsBlock, i}};
   }
-  const Result<FactorGraph::CovarianceReport> found = graph_.Covariance(functionals);
+  return functionals;
+}
+
+Result<Eigen::MatrixXd> PairGraph::NoiseCovariance() const {
+  const auto functionals = StateFunctionals();
+  if (!functionals) return tl::unexpected(functionals.error());
+  Result<FactorGraph::CovarianceReport> found = graph_.Covariance(*functionals);
+  if (!found) return tl::unexpected(found.error());
+  return std::move(found->covariance);
+}
+
+Status PairGraph::EstimateCovariance(double cluster_s, double inflation,
+                                     Calibration* calibration) const {
+  const auto functionals = StateFunctionals();
+  if (!functionals) return tl::unexpected(functionals.error());
+  const auto size = static_cast<Eigen::Index>(functionals->size());
+  const Eigen::Index num_effects = size - kStateSize;
+  const Result<FactorGraph::CovarianceReport> found = graph_.Covariance(*functionals);
   if (!found) return tl::unexpected(found.error());
   const FactorGraph::CovarianceReport& report = *found;
 

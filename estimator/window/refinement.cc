@@ -1,5 +1,6 @@
 #include "estimator/window/refinement.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -104,7 +105,40 @@ std::vector<FrameOffset> WidenedOffsets(const PairGraph& graph, double inflation
 // A tenth of a sigma. Robust weights and strong correlations (f and k1) make steps fall short.
 constexpr double kCostTolerance = 0.005;
 
+// Nobody needs a noise scale that is better known.
+bool SameScale(double before, double after) { return std::abs(after / before - 1.0) < 0.03; }
+
+// Steps of the state are measured in sigmas, all of it together. A step below this is the last one:
+// steps shrink by a factor of 1.5 to 5 each, so what is left is as much or twice as much, and that
+// of a state of 11 and more numbers.
+constexpr double kSettledStep = 0.1;
+// And of a round, with its new directions.
+constexpr double kSettledRound = 0.3;
+// In a round: at first it is not known what a sigma is, then where the noise scale ends.
+constexpr int kFirstSteps = 3, kStepsWithoutScale = 6, kMostSteps = 30;
+
 constexpr int kLeastPairs = 10;
+
+// How far two states are apart, with their effects, in sigmas: the Mahalanobis distance.
+class Yardstick {
+ public:
+  // covariance: of the state and the effects.
+  explicit Yardstick(const Eigen::MatrixXd& covariance)
+      : scale_(covariance.diagonal().cwiseSqrt().cwiseInverse()),
+        // Unit diagonal before the factorisation: the units differ by orders of magnitude.
+        correlation_(scale_.asDiagonal() * covariance * scale_.asDiagonal()) {}
+  double Distance(const Calibration& a, const Calibration& b) const {
+    Eigen::VectorXd d(scale_.size());
+    d.head<kStateSize>() = Difference(a, b);
+    d.tail(d.size() - kStateSize) = a.effect_values - b.effect_values;
+    d = scale_.cwiseProduct(d);
+    return std::sqrt(std::abs(d.dot(correlation_.solve(d))));
+  }
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::LDLT<Eigen::MatrixXd> correlation_;
+};
 
 // Noise scale, directions and solve in turns.
 class Refinement {
@@ -125,7 +159,6 @@ class Refinement {
   }
 
   Result<Refined> Run() {
-    double last_cost = 0.0;
     for (result_.rounds = 1; result_.rounds <= options_.max_rounds; ++result_.rounds) {
       const Calibration before = result_.calibration;
       // Rates are kept around the pairs as the delay was when they were added.
@@ -140,7 +173,7 @@ class Refinement {
       } else if (facts_.has_direction) {
         AllResiduals(/*search=*/true);
       }
-      const SolveReport report = graph_->Solve({30, 1e-5, kCostTolerance});
+      const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
       const bool spread_settled = UpdateFrameTimes(graph_.get(), &result_.frame_times);
@@ -148,14 +181,15 @@ class Refinement {
       const double next_scale = noise_.Next(residuals, scale_);
       result_.calibration = graph_->Estimate();
       const bool last = result_.rounds == options_.max_rounds;
-      if ((std::abs(next_scale / scale_ - 1.0) > 0.03 || !spread_settled) && !last) {
+      scale_settled_ = SameScale(scale_, next_scale) && spread_settled;
+      if (!scale_settled_ && !last) {
         SetScale(next_scale);
         continue;
       }
       // Where the next round would start from is not worth a covariance; the end is.
-      const bool costs_settled = std::abs(report.final_cost - last_cost) < 2e-4 * report.final_cost;
-      last_cost = report.final_cost;
-      if (!costs_settled && !last) continue;
+      const bool settled =
+          yardstick_ && yardstick_->Distance(before, result_.calibration) < kSettledRound;
+      if (!settled && !last) continue;
       if (const Status judged = Judge(before, residuals); !judged) {
         return tl::unexpected(judged.error());
       }
@@ -188,13 +222,36 @@ class Refinement {
   // The scale at the start, misfit included, so that a poor start is not cut off by the loss;
   // directions depend on it.
   void FindFirstScale() {
+    const double searched_at = scale_;  // as the pairs were added
     SetScale(noise_.Next(AllResiduals(/*search=*/false), scale_));
-    if (!facts_.of_attitudes) SetScale(noise_.Next(AllResiduals(/*search=*/true), scale_));
+    if (facts_.of_attitudes || SameScale(searched_at, scale_)) return;
+    SetScale(noise_.Next(AllResiduals(/*search=*/true), scale_));
   }
 
   void SetScale(double scale) {
     scale_ = scale;
     for (const int64_t id : ids_) graph_->SetSigma(id, scale_);
+  }
+
+  // The state decides when to stop: the directions of pairs that hardly determine theirs creep
+  // along flat valleys, for dozens of steps that move nothing else.
+  SolveReport Solve() {
+    SolveOptions options{kFirstSteps, 1e-5, kCostTolerance};
+    Calibration last = graph_->Estimate();
+    if (yardstick_) {
+      options.max_iterations = scale_settled_ ? kMostSteps : kStepsWithoutScale;
+      options.settled = [&] {
+        const Calibration now = graph_->Estimate();
+        const double step = yardstick_->Distance(last, now);
+        last = now;
+        return step < kSettledStep;
+      };
+    }
+    const SolveReport report = graph_->Solve(options);
+    if (report.usable && !yardstick_) {
+      if (const auto covariance = graph_->NoiseCovariance()) yardstick_.emplace(*covariance);
+    }
+    return report;
   }
 
   std::vector<std::vector<double>> AllResiduals(bool search) {
@@ -223,7 +280,7 @@ class Refinement {
     q.rms_px = scale_ * sum.rms();
     q.inlier_ratio = sum.inlier_ratio();
     result_.converged =
-        (moved.cwiseAbs().array() < 0.3 * result_.calibration.sigma().array()).all();
+        (moved.cwiseAbs().array() < kSettledRound * result_.calibration.sigma().array()).all();
     return {};
   }
 
@@ -238,6 +295,8 @@ class Refinement {
   std::vector<int64_t> ids_;
   Calibration built_at_;
   double scale_ = 1.0;
+  bool scale_settled_ = false;
+  std::optional<Yardstick> yardstick_;
   Refined result_;
 };
 

@@ -21,7 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr SolveOptions kToTheEnd{200, 1e-30};
+const SolveOptions kToTheEnd{200, 1e-30};
 
 BlockId Shutter() { return {BlockKind::kShutter, 0}; }
 BlockId Rotation() { return {BlockKind::kRotation, 0}; }
@@ -59,6 +59,34 @@ TEST(FactorGraph, TheNumberOfFactorsDoesNotDecideWhenAParameterHasSettled) {
   EXPECT_EQ(graph.value(Bias(0))[0], 0.0);
   ASSERT_TRUE(graph.Solve({10, 1e-5, 0.005}).usable);
   EXPECT_NEAR(graph.value(Bias(0))[0], 3.0, 0.1);
+}
+
+// x^4 / 2, whose steps fall short: each takes a half off.
+class Flat : public ceres::SizedCostFunction<1, 1> {
+ public:
+  bool Evaluate(const double* const* x, double* residuals, double** jacobians) const override {
+    residuals[0] = x[0][0] * x[0][0];
+    if (jacobians != nullptr && jacobians[0] != nullptr) jacobians[0][0] = 2.0 * x[0][0];
+    return true;
+  }
+};
+
+TEST(FactorGraph, WhoAsksForTheSolveSeesEachStepAndSaysWhenItHasSettled) {
+  FactorGraph graph;
+  graph.AddBlock(Bias(0), Euclidean(VectorXd::Constant(1, 1.0)));
+  graph.AddFactor(std::make_shared<Flat>(), {Bias(0)});
+  std::vector<double> seen;
+  SolveOptions options{50, 1e-30};
+  options.settled = [&] {
+    seen.push_back(graph.value(Bias(0))[0]);
+    return seen.back() < 0.1;
+  };
+  const SolveReport report = graph.Solve(options);
+  ASSERT_TRUE(report.usable);
+  ASSERT_GT(seen.size(), 2u);
+  EXPECT_EQ(report.iterations, static_cast<int>(seen.size()));
+  EXPECT_GT(seen[seen.size() - 2], 0.1);
+  EXPECT_EQ(graph.value(Bias(0))[0], seen.back());
 }
 
 // Every tangent coordinate of every block as a functional.
