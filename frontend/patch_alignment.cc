@@ -14,7 +14,7 @@ using Parameters = Eigen::Matrix<float, kParameters, 1>;
 using Information = Eigen::Matrix<float, kParameters, kParameters>;
 
 constexpr int kMaxIterations = 15;
-constexpr float kConvergedPx = 1e-3F;
+constexpr float kConvergedPx = 3e-3F;
 constexpr float kMaxShiftPx = 1.0F;  // from the guess
 // Of the weights, over half of the window: at its edge, the weight is 0.17.
 constexpr float kWeightSigma = 0.53F;

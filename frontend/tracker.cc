@@ -12,7 +12,8 @@
 namespace camgyro {
 namespace {
 
-const cv::TermCriteria kStop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.005);
+// Where KLT ends is where AlignPatch begins, which needs it within a pixel.
+const cv::TermCriteria kStop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.03);
 constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KLT has no texture
 // Variance that no texture takes away (interpolation, changes of shape), over that of the typical
 // corner.
