@@ -26,7 +26,7 @@ std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
   std::vector<Match> matches;
   for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
     if (i->track_id == j->track_id) {
-      matches.push_back({i->px, j->px, j->noise_factor});
+      matches.push_back({i->px, j->px, j->noise_factor, i->track_id});
       ++i, ++j;
     } else {
       i->track_id < j->track_id ? ++i : ++j;

@@ -44,9 +44,12 @@ struct TrackedPoint {
 };
 
 struct Match {
+  static constexpr int64_t kNoTrack = -1;
+
   Eigen::Vector2d px_a = Eigen::Vector2d::Zero();
   Eigen::Vector2d px_b = Eigen::Vector2d::Zero();
   Eigen::Vector3d noise_factor_b{1.0, 0.0, 1.0};  // as TrackedPoint's; px_a's is the identity
+  int64_t track_id = kNoTrack;                    // of matches that are made of tracks
 };
 
 // Matched features of two frames (indices into Recording::frames, frame_a < frame_b).

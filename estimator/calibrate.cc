@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "estimator/halves.h"
 #include "estimator/informative_pairs.h"
+#include "estimator/moving_tracks.h"
 
 namespace camgyro {
 namespace {
@@ -337,6 +338,7 @@ class CalibrationJob {
       }
     }
     if (!refined) return tl::unexpected(refined.error());
+    LeaveOutWhatMoves(refinement, &*refined);
     report_.calibration = refined->calibration;
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;
@@ -346,6 +348,25 @@ class CalibrationJob {
     TakeHalves(FitHalves(refinement, *refined));
     clock_.Finish("refinement");
     return {};
+  }
+
+  // Refits without the tracks that move, if there are any.
+  void LeaveOutWhatMoves(const RefinementOptions& options, Refined* refined) {
+    const Result<StillFit> still = FitWhatIsStill(
+        input_, refined_pairs_, options.graph,
+        [&](const std::vector<TimedPair>& pairs, const Refined* before) -> Result<Refined> {
+          if (before == nullptr) return *refined;
+          refined_pairs_ = pairs;
+          return RefineWith(options, before->calibration, before->quality.noise_px);
+        });
+    if (!still) return;
+    *refined = still->fit;
+    refined_pairs_ = still->pairs;
+    if (still->moving == 0) return;
+    report_.moving_tracks = still->moving;
+    report_.notes.push_back(
+        Format("%d of %d tracks keep to one side, as of things that move: left out", still->moving,
+               still->tracks));
   }
 
   void TakeHalves(const Halves& halves) {

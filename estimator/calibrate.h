@@ -68,6 +68,7 @@ struct CalibrationReport {
   // Beyond its 99.9 % quantile the covariance is multiplied by it, and a doubt says so.
   double halves_chi2 = 0.0;
   int skipped_pairs = 0;
+  int moving_tracks = 0;  // left out of the refinement (estimator/moving_tracks.h)
   // With frame_stamp_jitter: the frames' own times, by nanoseconds after the first gyro stamp.
   std::vector<FrameOffset> frame_times;
   bool converged = false;

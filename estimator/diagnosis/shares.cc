@@ -15,22 +15,6 @@ namespace {
 enum Share { kFit, kChoice, kReport };
 constexpr Share kDeal[] = {kFit, kChoice, kFit, kChoice, kReport};
 
-// Leaves those matches of a pair whose track is not in `forbidden`. The matches of a pair from
-// tracks are in ascending order of the tracks that both frames see.
-void DropTracks(const std::vector<TrackedPoint>& a, const std::vector<TrackedPoint>& b,
-                const std::set<int64_t>& forbidden, std::vector<Match>* matches) {
-  std::vector<Match> kept;
-  size_t match = 0;
-  auto it = b.begin();
-  for (const TrackedPoint& point : a) {
-    while (it != b.end() && it->track_id < point.track_id) ++it;
-    if (it == b.end() || it->track_id != point.track_id) continue;
-    if (forbidden.count(point.track_id) == 0) kept.push_back((*matches)[match]);
-    ++match;
-  }
-  *matches = std::move(kept);
-}
-
 }  // namespace
 
 Shares MakeShares(const Recording& recording, const EstimationInput& input) {
@@ -75,9 +59,11 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input) {
     if (share == kReport && has_tracks) {
       report_all.resize(shares.report.size());
       report_all.back().push_back(pair);
-      DropTracks(recording.tracks[static_cast<size_t>(pair.frame_a)],
-                 recording.tracks[static_cast<size_t>(pair.frame_b)], seen,
-                 &blocks.back().back().matches);
+      std::vector<Match>& matches = blocks.back().back().matches;
+      matches.erase(
+          std::remove_if(matches.begin(), matches.end(),
+                         [&](const Match& match) { return seen.count(match.track_id) > 0; }),
+          matches.end());
       usable += blocks.back().back().matches.size() >= static_cast<size_t>(PairGraph::kMinMatches)
                     ? 1
                     : 0;

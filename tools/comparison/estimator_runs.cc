@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "estimator/moving_tracks.h"
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "estimator/window/refinement.h"
 #include "estimator/window/sliding_window.h"
@@ -112,12 +113,17 @@ void RunRefinement(const Input& input, const EstimationInput& data, const PairGr
     from = window_trace.back().estimate;
     options.graph.sigma = window_trace.back().noise_px;
   }
-  std::optional<Result<Refined>> refined;
-  Measure([&] { refined = Refine(data, data.pairs, from, input.prior, options); }, run);
-  if (*refined) {
-    TakeResult((*refined)->calibration, input, run);
+  const auto fit = [&](const std::vector<TimedPair>& pairs, const Refined* before) {
+    if (before != nullptr) options.graph.sigma = before->quality.noise_px;
+    return Refine(data, pairs, before != nullptr ? before->calibration : from, input.prior,
+                  options);
+  };
+  std::optional<Result<StillFit>> still;
+  Measure([&] { still = FitWhatIsStill(data, data.pairs, graph, fit); }, run);
+  if (*still) {
+    TakeResult((*still)->fit.calibration, input, run);
   } else {
-    run->failure = refined->error().message;
+    run->failure = still->error().message;
   }
 }
 
