@@ -49,3 +49,19 @@ install(FILES ${PROJECT_SOURCE_DIR}/cmake/FindRosbagStorage.cmake
         DESTINATION ${package_dir})
 
 install(TARGETS camgyro RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+
+# Manual pages and bash completion, from what the program says of itself.
+find_program(CAMGYRO_PYTHON3 python3)
+if(CAMGYRO_PYTHON3)
+  set(help_files ${PROJECT_BINARY_DIR}/help_files)
+  add_custom_command(OUTPUT ${help_files}/completions/camgyro VERBATIM
+                     DEPENDS camgyro ${PROJECT_SOURCE_DIR}/tools/help_files.py
+                     COMMAND ${CAMGYRO_PYTHON3} ${PROJECT_SOURCE_DIR}/tools/help_files.py
+                             $<TARGET_FILE:camgyro> ${help_files})
+  add_custom_target(camgyro_help_files ALL DEPENDS ${help_files}/completions/camgyro)
+  install(DIRECTORY ${help_files}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT program)
+  install(FILES ${help_files}/completions/camgyro COMPONENT program
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+else()
+  message(STATUS "python3 not found: no manual pages, no bash completion")
+endif()

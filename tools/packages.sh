@@ -28,6 +28,8 @@ for package in "$build"/deb/*.deb; do
   echo "$(basename "$package"): $(dpkg-deb -f "$package" Depends | tr ',' '\n' | wc -l) dependencies, $(du -k "$package" | cut -f1) KiB"
 done
 "$root/usr/bin/camgyro" calibrate tools/sample --out="$root/result" --quiet >/dev/null
+gzip -dc "$root/usr/share/man/man1/camgyro-calibrate.1.gz" | grep -q '^\.SH OPTIONS'
+bash -c "source $root/usr/share/bash-completion/completions/camgyro"
 PYTHONPATH=$root/usr/lib/python3/dist-packages /usr/bin/python3 -c 'import camgyro; camgyro.read_recording'
 cmake -S examples/minimal -B "$root/minimal" -G Ninja -DCMAKE_PREFIX_PATH="$root/usr" \
   -DCMAKE_BUILD_TYPE=Release >/dev/null
