@@ -69,6 +69,32 @@ class Normal {
   std::normal_distribution<double> normal_;
 };
 
+// The accelerometer's bias, a random walk. Its random numbers are its own, so that switching it on
+// leaves everything else as it was.
+class AccelBias {
+ public:
+  explicit AccelBias(const Scenario& scenario)
+      : bias_m_s2_(scenario.gyro.accel_bias_m_s2),
+        step_m_s2_(scenario.gyro.accel_bias_walk_m_s3_rtHz / std::sqrt(scenario.gyro.rate_hz)) {
+    constexpr uint32_t kStream = 200;  // simulate.cc counts from 0, render.cc from 100
+    std::seed_seq sequence{static_cast<uint32_t>(scenario.seed),
+                           static_cast<uint32_t>(scenario.seed >> 32), kStream};
+    random_.seed(sequence);
+  }
+
+  Vector3d Next() {
+    const Vector3d bias = bias_m_s2_;
+    bias_m_s2_ += step_m_s2_ * normal_.Vector();
+    return bias;
+  }
+
+ private:
+  std::mt19937_64 random_;
+  Normal normal_{&random_};
+  Vector3d bias_m_s2_;
+  double step_m_s2_;
+};
+
 // What an accelerometer at the gyro feels, in the gyro frame [m/s^2].
 Vector3d SpecificForce(const Scenario& scenario, const Trajectory& trajectory, double time_s) {
   const Matrix3d R_gyro_cam = scenario.mount.q_gyro_cam.toRotationMatrix();
@@ -100,6 +126,7 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
 
   Element element(scenario, trajectory);
   Normal normal(random);
+  AccelBias accel_bias(scenario);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   SimulatedGyro result;
   Vector3d walk = Vector3d::Zero();
@@ -131,7 +158,7 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
     }
 
     // Draws are the same whatever is switched on, so that recordings differ by the effect alone.
-    const Vector3d accel_noise = sigma_accel * normal.Vector();
+    const Vector3d accel_error = accel_bias.Next() + sigma_accel * normal.Vector();
     const double jitter_s = options.stamp_jitter_s * normal();
     if (unit(*random) < options.drop_fraction && i > 0 && i + 1 < count) continue;
     int64_t stamp_ns =
@@ -139,7 +166,7 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
     if (!result.gyro.empty()) stamp_ns = std::max(stamp_ns, result.gyro.back().stamp_ns + 1000);
     result.gyro.push_back({stamp_ns, rate});
     if (options.accelerometer) {
-      result.accel.push_back({stamp_ns, input.force_m_s2 + accel_noise});
+      result.accel.push_back({stamp_ns, input.force_m_s2 + accel_error});
     }
   }
   return result;

@@ -110,6 +110,8 @@ void Read(YamlSection section, GyroOptions* gyro) {
   section.Read("accelerometer", &gyro->accelerometer);
   section.Read("accel_noise_density_m_s2_rtHz", &gyro->accel_noise_density_m_s2_rtHz,
                Range::kNotNegative);
+  section.Read("accel_bias_m_s2", &gyro->accel_bias_m_s2);
+  section.Read("accel_bias_walk_m_s3_rtHz", &gyro->accel_bias_walk_m_s3_rtHz, Range::kNotNegative);
   section.Finish();
 }
 

@@ -96,6 +96,8 @@ struct GyroOptions {
   double quantum_rad_s = 0.0;  // 0: none
   bool accelerometer = true;
   double accel_noise_density_m_s2_rtHz = 2e-3;
+  Eigen::Vector3d accel_bias_m_s2 = Eigen::Vector3d::Zero();
+  double accel_bias_walk_m_s3_rtHz = 0.0;
 };
 
 struct TrackOptions {

@@ -122,14 +122,20 @@ Status WriteTruth(const Simulated& s, const Scenario& scenario, const fs::path& 
   return file.Close();
 }
 
+// From our world, whose y axis is down, into one whose z axis is up.
+Eigen::Matrix3d UpFromDown() {
+  Eigen::Matrix3d R_up_down;
+  R_up_down << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  return R_up_down;
+}
+
 Status WriteTrajectory(const Simulated& s, const Scenario& scenario, const fs::path& root) {
   TextFile file(root / "truth_trajectory.csv");
   file.Print(
       "#gyro clock [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z,frame stamp [ns],delay [s],"
       "focal [px],b_x [rad s^-1],b_y [rad s^-1],b_z [rad s^-1]\n");
-  // Pose of the camera at the first row, in a world whose z axis is up (ours: y is down).
-  Eigen::Matrix3d R_up_down;
-  R_up_down << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  // Pose of the camera at the first row.
+  const Eigen::Matrix3d R_up_down = UpFromDown();
   for (size_t i = 0; i < s.frames.size(); ++i) {
     const FrameTruth& frame = s.frames[i];
     const Eigen::Vector3d p = R_up_down * frame.state.p_world_m;
@@ -140,6 +146,26 @@ Status WriteTrajectory(const Simulated& s, const Scenario& scenario, const fs::p
                Stamp(StampAt(scenario.start_ns, first_row_s)), p.x(), p.y(), p.z(), q.w(), q.x(),
                q.y(), q.z(), Stamp(s.recording.frames[i].stamp_ns), frame.delay_s, frame.focal_px,
                b.x(), b.y(), b.z());
+  }
+  return file.Close();
+}
+
+// The pose that `camgyro odometry` estimates: the gyro frame at the middle row, z up.
+Status WriteGyroTrajectory(const Simulated& s, const Scenario& scenario, const fs::path& root) {
+  TextFile file(root / "truth_trajectory.tum");
+  file.Print("# time [s, gyro clock] x y z [m] qx qy qz qw: gyro frame in the world, z up\n");
+  const Eigen::Vector2d middle_px(0.5 * scenario.camera.width_px, 0.5 * scenario.camera.height_px);
+  for (const FrameTruth& frame : s.frames) {
+    const double time_s = s.camera->ExposureTime(frame.timing, middle_px);
+    const CameraState state = s.camera->trajectory().At(time_s);
+    const Eigen::Matrix3d R_up_gyro =
+        UpFromDown() * state.R_world_cam * scenario.mount.q_gyro_cam.conjugate();
+    const Eigen::Vector3d p =
+        UpFromDown() * state.p_world_m - R_up_gyro * scenario.mount.p_gyro_cam_m;
+    const Eigen::Quaterniond q(R_up_gyro);
+    const long long time_ns = Stamp(StampAt(scenario.start_ns, time_s));
+    file.Print("%lld.%09lld %.9f %.9f %.9f %.12f %.12f %.12f %.12f\n", time_ns / 1000000000,
+               time_ns % 1000000000, p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
   }
   return file.Close();
 }
@@ -204,6 +230,7 @@ Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
     if (status) status = WriteSensorYaml(simulated, scenario, root);
     if (status) status = WriteTruth(simulated, scenario, root);
     if (status) status = WriteTrajectory(simulated, scenario, root);
+    if (status) status = WriteGyroTrajectory(simulated, scenario, root);
     if (status && scenario.video.format != VideoFormat::kNone) {
       status = WritePictures(simulated, scenario, root / "cam0", progress);
     }

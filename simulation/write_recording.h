@@ -18,6 +18,7 @@ namespace camgyro::simulation {
 //   truth.yaml                 keys of calibration.yaml, without sigmas and covariance
 //   truth_trajectory.csv       one row per frame; EuRoC ground truth first, so that it can serve
 //                              as motion.file
+//   truth_trajectory.tum       the gyro frame at every frame's middle row, as odometry has it
 // The same scenario gives the same bytes. `progress` is told the frames done, if given.
 Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
                       const std::string& folder,

@@ -50,6 +50,30 @@ double TimeOf(const Scenario& scenario, const GyroSample& sample) {
   return SecondsSince(scenario.start_ns, sample.stamp_ns);
 }
 
+// The accelerometer's bias is where it is set at first, walks as far as its density says, and
+// leaves all other random numbers as they were.
+TEST(Gyro, AccelerometerHasABiasThatWalks) {
+  Scenario scenario;
+  const Tone tone(1.5, 2.0);
+  const SimulatedGyro without = SampleGyro(scenario, tone);
+  scenario.gyro.accel_bias_m_s2 = {0.1, -0.2, 0.05};
+  scenario.gyro.accel_bias_walk_m_s3_rtHz = 0.03;
+  const SimulatedGyro with = SampleGyro(scenario, tone);
+  ASSERT_EQ(with.accel.size(), without.accel.size());
+  const auto bias = [&](size_t i) -> Vector3d {
+    return with.accel[i].accel_gyro_m_s2 - without.accel[i].accel_gyro_m_s2;
+  };
+  EXPECT_LT((bias(0) - scenario.gyro.accel_bias_m_s2).norm(), 1e-12);
+  double squared = 0.0;
+  for (size_t i = 1; i < with.accel.size(); ++i) {
+    EXPECT_EQ(with.gyro[i].omega_gyro_rad_s, without.gyro[i].omega_gyro_rad_s);
+    squared += (bias(i) - bias(i - 1)).squaredNorm() / 3.0;
+  }
+  // 6600 steps: their mean square is known to 1.7 %.
+  const double expected = 0.03 * 0.03 / scenario.gyro.rate_hz;
+  EXPECT_NEAR(squared / static_cast<double>(with.accel.size() - 1), expected, 0.07 * expected);
+}
+
 TEST(Gyro, MeasuresTheRateInItsOwnFrameWithBias) {
   Scenario scenario = Quiet();
   scenario.mount.q_gyro_cam = MountOptions::DefaultRotation();

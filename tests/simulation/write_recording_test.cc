@@ -158,6 +158,29 @@ TEST_F(WriteRecordingTest, TrajectoryCanBeTheMotionOfAnother) {
   EXPECT_LT((a.p_world_m - s.frames[0].state.p_world_m - b.p_world_m).norm(), 2e-3);
 }
 
+// The trajectory of the gyro frame, from that of the camera at the first row: between two frames
+// without rotation and acceleration both move alike, the lever arm apart.
+TEST_F(WriteRecordingTest, GyroTrajectoryIsTheCamerasLessTheLeverArm) {
+  const Scenario scenario =
+      ParseScenario(
+          "{duration_s: 1, motion: {kind: rotation, rotation_rms_rad_s: [0, 0, 0], speed_m_s: 1, "
+          "heading_deg: 0}, camera: {readout_s: 0.02, delay_s: 0.01}, "
+          "mount: {q_gyro_cam_wxyz: [0, 1, 0, 0], p_gyro_cam_m: [0.1, 0.2, 0.3]}}")
+          .value();
+  ASSERT_TRUE(WriteRecording(SimulateSensors(scenario).value(), scenario, Folder("out")));
+  std::ifstream file(Folder("out") + "/truth_trajectory.tum");
+  std::string comment;
+  std::getline(file, comment);
+  double time_s = 0.0, x = 0.0, y = 0.0, z = 0.0;
+  ASSERT_TRUE(file >> time_s >> x >> y >> z);
+  // The first row is exposed 0.5 s after the first gyro stamp, 1000 s; the camera goes along its
+  // own z, the world's y, at 1 m/s. The gyro frame is the camera's turned by pi about x.
+  EXPECT_NEAR(time_s, 1000.51, 1e-6);
+  EXPECT_NEAR(x, -0.1, 1e-6);
+  EXPECT_NEAR(y, 0.51 + 0.3, 1e-6);
+  EXPECT_NEAR(z, -0.2, 1e-6);
+}
+
 TEST_F(WriteRecordingTest, RefusesWithTheFilesName) {
   EXPECT_THAT(RunSimulate(Folder("none.yaml"), Folder("out")).error().message,
               HasSubstr("none.yaml"));
