@@ -26,8 +26,12 @@ Renderer::Renderer(const Simulated& simulated, const Scenario& scenario)
       camera_(*simulated.camera),
       scene_(simulated.scene),
       frames_(simulated.frames),
-      random_(MakeRandom(scenario.seed, 100)),
-      texture_(&random_) {
+      random_(MakeRandom(scenario.seed, 100)) {
+  textures_.emplace_back(&random_);
+  std::mt19937_64 more = MakeRandom(scenario.seed, 101);
+  for (const Surface& surface : scene_.surfaces()) {
+    while (static_cast<int>(textures_.size()) <= surface.texture) textures_.emplace_back(&more);
+  }
   std::normal_distribution<float> normal;
   for (int i = 0; i < 1 << 16; ++i) normals_.push_back(normal(random_));
   for (int i = 0; i < static_cast<int>(scene_.surfaces().size()); ++i) {
@@ -198,8 +202,9 @@ float Renderer::Shade(const Hit& hit, const Vector3d& origin, const Vector3d& di
   const double footprint_m =
       hit.distance / scenario_.camera.focal_px * std::max(1.0, 0.67 / cosine);
   const double tiles = 1.0 / surface.tile_m;
-  const float albedo = texture_.At(a * tiles + surface.texture_shift.x() + face_shift,
-                                   b * tiles + surface.texture_shift.y(), footprint_m * tiles);
+  const Texture& texture = textures_[static_cast<size_t>(surface.texture)];
+  const float albedo = texture.At(a * tiles + surface.texture_shift.x() + face_shift,
+                                  b * tiles + surface.texture_shift.y(), footprint_m * tiles);
   return kLight[hit.face] * (0.08f + 0.9f * albedo);
 }
 

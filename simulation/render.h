@@ -53,10 +53,10 @@ class Renderer {
   const Scene& scene_;
   const std::vector<FrameTruth>& frames_;
   std::mt19937_64 random_;
-  Texture texture_;
-  std::vector<float> normals_;  // table of standard normal numbers
-  std::vector<int> unbounded_;  // surfaces that may be seen anywhere
-  std::vector<Box> boxes_;      // the others, for the frame in work
+  std::vector<Texture> textures_;  // by Surface::texture
+  std::vector<float> normals_;     // table of standard normal numbers
+  std::vector<int> unbounded_;     // surfaces that may be seen anywhere
+  std::vector<Box> boxes_;         // the others, for the frame in work
 };
 
 }  // namespace camgyro::simulation

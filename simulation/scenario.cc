@@ -46,6 +46,7 @@ void Read(YamlSection section, SceneOptions* scene) {
                {{"points", SceneKind::kPoints},
                 {"ground", SceneKind::kGround},
                 {"room", SceneKind::kRoom},
+                {"corridor", SceneKind::kCorridor},
                 {"facade", SceneKind::kFacade},
                 {"mountains", SceneKind::kMountains}});
   section.Read("depth_law", &scene->depth_law,
@@ -56,6 +57,7 @@ void Read(YamlSection section, SceneOptions* scene) {
   section.Read("ground_m", &scene->ground_m, Range::kPositive);
   section.Read("distance_m", &scene->distance_m, Range::kPositive);
   section.Read("room_m", &scene->room_m, Range::kPositive);
+  section.Read("block_m", &scene->block_m, Range::kPositive);
   section.Read("far_m", &scene->far_m, Range::kPositive);
   section.Read("moving_fraction", &scene->moving_fraction, Range::kFraction);
   section.Read("moving_objects", &scene->moving_objects);
@@ -152,8 +154,8 @@ void Read(YamlSection section, Effects* effects) {
 
 std::string CheckTogether(const Scenario& scenario) {
   if (scenario.video.format != VideoFormat::kNone && scenario.scene.kind == SceneKind::kPoints) {
-    return "video.format: points have no surface to show; set scene.kind to ground, room, facade "
-           "or mountains";
+    return "video.format: points have no surface to show; set scene.kind to ground, room, "
+           "corridor, facade or mountains";
   }
   if (scenario.video.max_blur_samples < 4 || scenario.video.max_blur_samples > 64) {
     return "video.max_blur_samples: must lie between 4 and 64";
@@ -163,6 +165,11 @@ std::string CheckTogether(const Scenario& scenario) {
   }
   if (scenario.scene.depth_m[0] >= scenario.scene.depth_m[1]) {
     return "scene.depth_m: must be [nearest, farthest]";
+  }
+  if (scenario.scene.kind == SceneKind::kCorridor &&
+      (scenario.scene.block_m[0] >= scenario.scene.room_m[0] ||
+       scenario.scene.block_m[1] >= scenario.scene.room_m[2])) {
+    return "scene.block_m: must be smaller than room_m";
   }
   if (scenario.tracks.count < 0 || scenario.scene.moving_objects < 0) {
     return "tracks.count, scene.moving_objects: must not be negative";

@@ -48,7 +48,7 @@ struct MotionOptions {
 };
 MotionOptions MotionPreset(MotionKind kind);
 
-enum class SceneKind { kPoints, kGround, kRoom, kFacade, kMountains };
+enum class SceneKind { kPoints, kGround, kRoom, kCorridor, kFacade, kMountains };
 enum class DepthLaw { kUniform, kLogarithmic, kInverse };
 
 // World frame: the level camera's at the start: x right, y down, z forward, origin at the start.
@@ -58,10 +58,11 @@ struct SceneOptions {
   Eigen::Vector2d depth_m = {1.5, 20.0};        // kind points
   double ground_m = 1.6;                        // kinds ground, facade: height of the camera
   double distance_m = 8.0;                      // kind facade: of the wall
-  Eigen::Vector3d room_m = {7.0, 3.0, 9.0};     // kind room: width, height, length
-  double far_m = 2000.0;                        // kinds ground, facade, mountains: of the horizon
-  double moving_fraction = 0.0;                 // kind points: of them moving by themselves
-  int moving_objects = 0;                       // other kinds: boxes that move
+  Eigen::Vector3d room_m = {7.0, 3.0, 9.0};     // kinds room, corridor: width, height, length
+  Eigen::Vector2d block_m = {3.0, 3.0};  // kind corridor: width, length of what it goes round
+  double far_m = 2000.0;                 // kinds ground, facade, mountains: of the horizon
+  double moving_fraction = 0.0;          // kind points: of them moving by themselves
+  int moving_objects = 0;                // other kinds: boxes that move
   double moving_speed_m_s = 1.0;
 };
 

@@ -38,11 +38,55 @@ class Builder {
                   speed_m_s / box.swing_rate_rad_s;
   }
 
+  // A wall of the corridor, from `begin` over `length_m` along x (axis 0) or z (2), hung with
+  // pictures that occur nowhere else: without them one stretch would look like any other. In front
+  // of each, if `furniture_side` is not 0, a box stands on that side.
+  void AddPanels(const Vector3d& begin, int axis, double length_m, double height_m,
+                 double furniture_side) {
+    constexpr double kPanelM = 5.0, kThickM = 0.02;
+    const int count = static_cast<int>(std::ceil(length_m / kPanelM));
+    const double half_m = 0.5 * length_m / count;
+    const int across = 2 - axis;
+    for (int i = 0; i < count; ++i) {
+      Vector3d centre = begin, half(0.0, 0.5 * height_m, 0.0);
+      centre[axis] += (2 * i + 1) * half_m;
+      half[axis] = half_m;
+      half[across] = kThickM;
+      Add(Shape::kBox, centre, half, std::max(2.0 * half_m, height_m)).texture = ++textures_;
+      const double tall_m = Uniform(0.2, 0.4) * height_m, wide_m = Uniform(0.2, 0.4);
+      const double place = Uniform(-0.7, 0.7), deep_m = Uniform(0.15, 0.3);
+      if (furniture_side == 0.0) continue;
+      centre[axis] += place * half_m;
+      centre[across] += furniture_side * deep_m;
+      centre.y() = begin.y() + 0.5 * height_m - tall_m;
+      half[axis] = wide_m;
+      half[across] = deep_m;
+      half.y() = tall_m;
+      Add(Shape::kBox, centre, half, 2.0).texture = ++textures_;
+    }
+  }
+
   std::vector<Surface> surfaces;
 
  private:
+  int textures_ = 0;
   std::mt19937_64* random_;
 };
+
+// A way round a block inside a room. One tile of texture covers the floor: a pattern that repeats
+// would show the same at many places.
+void AddCorridor(const SceneOptions& options, Builder* build) {
+  const Vector3d half = 0.5 * options.room_m;
+  const Eigen::Vector2d block = 0.5 * options.block_m;
+  const double height_m = options.room_m.y();
+  build->Add(Shape::kRoom, Vector3d::Zero(), half, 2.0 * half.maxCoeff());
+  for (const double side : {-1.0, 1.0}) {
+    build->AddPanels({-half.x(), 0.0, side * half.z()}, 0, 2.0 * half.x(), height_m, -side);
+    build->AddPanels({side * half.x(), 0.0, -half.z()}, 2, 2.0 * half.z(), height_m, -side);
+    build->AddPanels({-block.x(), 0.0, side * block.y()}, 0, 2.0 * block.x(), height_m, 0.0);
+    build->AddPanels({side * block.x(), 0.0, -block.y()}, 2, 2.0 * block.y(), height_m, 0.0);
+  }
+}
 
 }  // namespace
 
@@ -62,6 +106,9 @@ Scene Scene::Make(const SceneOptions& options, std::mt19937_64* random) {
     case SceneKind::kMountains:
       build.Add(Shape::kGround, {0.0, 0.05 * options.far_m, 0.0}, none, 0.2 * options.far_m);
       build.Add(Shape::kDome, none, {options.far_m, 0.0, 0.0}, tile_far);
+      break;
+    case SceneKind::kCorridor:
+      floor_y = 0.5 * options.room_m.y();
       break;
     case SceneKind::kFacade: {
       const double wall = options.distance_m;
@@ -103,6 +150,7 @@ Scene Scene::Make(const SceneOptions& options, std::mt19937_64* random) {
       break;
     }
   }
+  if (options.kind == SceneKind::kCorridor) AddCorridor(options, &build);
   for (int i = 0; i < options.moving_objects; ++i) {
     const double height = build.Uniform(0.4, 0.9);
     build.AddMoving({build.Uniform(moving_low.x(), moving_high.x()), floor_y - height,

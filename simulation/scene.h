@@ -21,6 +21,7 @@ struct Surface {
   Eigen::Vector3d swing_m = Eigen::Vector3d::Zero();
   double swing_rate_rad_s = 0.0, swing_phase_rad = 0.0;
   double tile_m = 4.0;  // size of one tile of the texture
+  int texture = 0;      // surfaces of one number share a texture
   Eigen::Vector2d texture_shift = Eigen::Vector2d::Zero();
   bool moving() const { return !swing_m.isZero(0.0); }
 };

@@ -30,9 +30,13 @@ Status CheckInside(const Simulated& simulated, const SceneOptions& scene) {
     const Vector3d& p = frame.state.p_world_m;
     const std::string when = " at " + Seconds(frame.timing.stamp_s) +
                              ": slow the motion, or send it round with motion.path_radius_m";
-    if (scene.kind == SceneKind::kRoom &&
+    if ((scene.kind == SceneKind::kRoom || scene.kind == SceneKind::kCorridor) &&
         ((0.5 * scene.room_m - p.cwiseAbs()).array() < kMargin).any()) {
       return BadInput("the camera leaves the room" + when);
+    }
+    if (scene.kind == SceneKind::kCorridor && std::abs(p.x()) < 0.5 * scene.block_m[0] + kMargin &&
+        std::abs(p.z()) < 0.5 * scene.block_m[1] + kMargin) {
+      return BadInput("the camera runs into the block" + when);
     }
     if (scene.kind == SceneKind::kFacade && p.z() > scene.distance_m - kMargin) {
       return BadInput("the camera runs into the wall" + when);

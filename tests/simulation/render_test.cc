@@ -114,6 +114,25 @@ TEST(Render, AgreesOnAFacadeWithThingsInFront) {
   ExpectAgreement(scenario);
 }
 
+// A corridor shows no stretch twice: panels have textures of their own.
+TEST(Render, AgreesInACorridorWhereNoPanelRepeats) {
+  Scenario scenario = SmallRoom();
+  scenario.scene.kind = SceneKind::kCorridor;
+  scenario.scene.room_m = {9.0, 3.0, 9.0};
+  scenario.motion.path_radius_m = 3.0;
+  ExpectAgreement(scenario);
+  const Simulated s = SimulateSensors(scenario).value();
+  std::set<int> textures;
+  size_t boxes = 0;
+  for (const Surface& surface : s.scene.surfaces()) {
+    if (surface.shape != Shape::kBox) continue;
+    ++boxes;
+    textures.insert(surface.texture);
+  }
+  EXPECT_EQ(textures.size(), boxes);
+  EXPECT_EQ(boxes, 2u * 8u + 4u);  // two panels with furniture to a side of 9 m, one to one of 3 m
+}
+
 TEST(Render, NoiseIsThatOfPhotons) {
   Scenario scenario = SmallRoom();
   scenario.duration_s = 0.04;

@@ -242,6 +242,30 @@ TEST(Tracks, CameraMustStayInItsRoom) {
   EXPECT_THAT(result.error().message, testing::HasSubstr("leaves the room"));
 }
 
+// Points of a corridor lie between the walls of the room and those of the block, and a walk into
+// the block is refused.
+TEST(Tracks, CorridorGoesRoundABlock) {
+  Scenario scenario = Noiseless();
+  scenario.duration_s = 4.0;
+  scenario.scene.kind = SceneKind::kCorridor;
+  scenario.scene.room_m = {9.0, 3.0, 9.0};
+  scenario.motion.path_radius_m = 3.0;
+  const Simulated s = SimulateTracks(scenario).value();
+  const Vector3d half = 0.5 * scenario.scene.room_m;
+  for (const auto& points : s.points) {
+    for (const PointTruth& point : points) {
+      EXPECT_LT((point.world_m.cwiseAbs() - half).maxCoeff(), 1e-9);
+      const bool in_block = std::abs(point.world_m.x()) < 0.5 * scenario.scene.block_m[0] - 0.03 &&
+                            std::abs(point.world_m.z()) < 0.5 * scenario.scene.block_m[1] - 0.03;
+      EXPECT_FALSE(in_block && std::abs(point.world_m.y()) < half.y() - 1e-9);
+    }
+  }
+  scenario.motion.path_radius_m = 1.5;
+  const auto result = SimulateTracks(scenario);
+  ASSERT_FALSE(result);
+  EXPECT_THAT(result.error().message, testing::HasSubstr("runs into the block"));
+}
+
 TEST(Tracks, SameSeedSameRecordingOtherSeedAnother) {
   const Simulated a = SimulateTracks(Scenario(), 5).value();
   const Simulated b = SimulateTracks(Scenario(), 5).value();
