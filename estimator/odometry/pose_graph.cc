@@ -1,0 +1,176 @@
+#include "estimator/odometry/pose_graph.h"
+
+#include <ceres/covariance.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace camgyro {
+namespace {
+
+using Eigen::Matrix4d;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+
+constexpr double kLossSigmas = 2.0;
+constexpr double kOutlierSigmas = 5.0;
+// What the window knows of the way between two keyframes at best: far below what it accumulates
+// over seconds, and enough for a covariance that can be inverted.
+constexpr double kLeastWayM = 1e-3, kLeastTurnRad = 1e-4;
+constexpr int kIterations = 100;
+
+// What a change of (position, yaw) does to the state, yaw about the position itself.
+Eigen::Matrix<double, kNavSize, 4> StateByPose(const NavigationState& state) {
+  Eigen::Matrix<double, kNavSize, 4> J = Eigen::Matrix<double, kNavSize, 4>::Zero();
+  J.block<3, 3>(kNavPosition, 0).setIdentity();
+  J.block<3, 1>(kNavRotation, 3) = state.q_world_gyro.conjugate() * Vector3d::UnitZ();
+  J.block<3, 1>(kNavVelocity, 3) = Vector3d::UnitZ().cross(state.v_world_m_s);
+  return J;
+}
+
+// Of (position, yaw) in the world.
+Matrix4d PoseCovariance(const OdometryPose& pose) {
+  Eigen::Matrix<double, 4, kNavSize> J = Eigen::Matrix<double, 4, kNavSize>::Zero();
+  J.block<3, 3>(0, kNavPosition).setIdentity();
+  J.block<1, 3>(3, kNavRotation) = pose.state.q_world_gyro.toRotationMatrix().row(2);
+  return J * pose.covariance * J.transpose();
+}
+
+// One problem; `poses` is contiguous, so that the order of its blocks is that of the keyframes
+// whatever their addresses are, and the result the same in its last digit.
+class Graph {
+ public:
+  Graph(const std::vector<OdometryPose>& keyframes, std::vector<Vector4d>* poses) : poses_(*poses) {
+    for (Vector4d& pose : poses_) problem_.AddParameterBlock(pose.data(), 4);
+    problem_.SetParameterBlockConstant(poses_.front().data());
+    for (size_t i = 0; i + 1 < keyframes.size(); ++i) {
+      Add({i, i + 1, WayBetween(keyframes[i], keyframes[i + 1])}, nullptr);
+    }
+  }
+
+  ceres::ResidualBlockId AddLoop(const LoopEdge& loop) {
+    return Add(loop, new ceres::CauchyLoss(kLossSigmas));
+  }
+
+  double Sigmas(ceres::ResidualBlockId loop) {
+    Vector4d residual;
+    problem_.EvaluateResidualBlock(loop, /*apply_loss_function=*/false, nullptr, residual.data(),
+                                   nullptr);
+    return residual.norm();
+  }
+  void Remove(ceres::ResidualBlockId loop) { problem_.RemoveResidualBlock(loop); }
+
+  bool Solve() {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    options.max_num_iterations = kIterations;
+    options.function_tolerance = 1e-9;
+    options.num_threads = 1;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    return summary.IsSolutionUsable();
+  }
+
+  // Of every keyframe but the first, which is the frame of all; empty if it cannot be had.
+  std::vector<Matrix4d> Covariances() {
+    std::vector<std::pair<const double*, const double*>> blocks;
+    for (const Vector4d& pose : poses_) blocks.emplace_back(pose.data(), pose.data());
+    ceres::Covariance::Options options;
+    options.num_threads = 1;
+    ceres::Covariance covariance(options);
+    if (!covariance.Compute(blocks, &problem_)) return {};
+    std::vector<Matrix4d> result;
+    for (const Vector4d& pose : poses_) {
+      Eigen::Matrix<double, 4, 4, Eigen::RowMajor> block;
+      covariance.GetCovarianceBlock(pose.data(), pose.data(), block.data());
+      result.emplace_back(block);
+    }
+    return result;
+  }
+
+ private:
+  ceres::ResidualBlockId Add(const LoopEdge& edge, ceres::LossFunction* loss) {
+    return problem_.AddResidualBlock(MakeRelativeYawPosition(edge.measured).release(), loss,
+                                     poses_[edge.older].data(), poses_[edge.newer].data());
+  }
+
+  std::vector<Vector4d>& poses_;
+  ceres::Problem problem_;
+};
+
+OdometryPose MovedTo(const OdometryPose& from, const Vector4d& pose, const Matrix4d& covariance) {
+  OdometryPose moved = from;
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(pose[3], Vector3d::UnitZ()));
+  moved.state.q_world_gyro = (turn * from.state.q_world_gyro).normalized();
+  moved.state.v_world_m_s = turn * from.state.v_world_m_s;
+  moved.state.p_world_m = pose.head<3>();
+  const auto J = StateByPose(moved.state);
+  moved.covariance += J * (covariance - PoseCovariance(moved)) * J.transpose();
+  return moved;
+}
+
+}  // namespace
+
+RelativeYawPosition WayBetween(const OdometryPose& a, const OdometryPose& b) {
+  const Vector3d way_m = b.state.p_world_m - a.state.p_world_m;
+  RelativeYawPosition way;
+  way.p_a_b_m = way_m;
+  Matrix4d F = Matrix4d::Identity();
+  F.block<3, 1>(0, 3) = Vector3d::UnitZ().cross(way_m);
+  const Matrix4d increment = PoseCovariance(b) - F * PoseCovariance(a) * F.transpose();
+  // In units of the least sigmas, eigenvalues of at least one.
+  const Vector4d least(kLeastWayM, kLeastWayM, kLeastWayM, kLeastTurnRad);
+  const Vector4d unit = least.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Matrix4d> eigen(unit.asDiagonal() * increment *
+                                                      unit.asDiagonal());
+  way.covariance = least.asDiagonal() * eigen.eigenvectors() *
+                   eigen.eigenvalues().cwiseMax(1.0).asDiagonal() *
+                   eigen.eigenvectors().transpose() * least.asDiagonal();
+  return way;
+}
+
+Result<ClosedLoops> CloseLoops(const std::vector<OdometryPose>& keyframes,
+                               const std::vector<LoopEdge>& loops) {
+  for (const LoopEdge& loop : loops) {
+    if (loop.older >= loop.newer || loop.newer >= keyframes.size()) {
+      return BadInput("pose graph: a loop between keyframes that are not there");
+    }
+  }
+  ClosedLoops closed;
+  closed.keyframes = keyframes;
+  closed.believed.assign(loops.size(), false);
+  if (loops.empty()) return closed;
+
+  std::vector<Vector4d> poses(keyframes.size(), Vector4d::Zero());
+  for (size_t i = 0; i < keyframes.size(); ++i) {
+    poses[i].head<3>() = keyframes[i].state.p_world_m;
+  }
+  Graph graph(keyframes, &poses);
+  std::vector<ceres::ResidualBlockId> ids;
+  for (const LoopEdge& loop : loops) ids.push_back(graph.AddLoop(loop));
+  const tl::unexpected<Error> failed = CannotEstimate("the pose graph has no solution");
+  if (!graph.Solve()) return failed;
+  for (size_t i = 0; i < loops.size(); ++i) {
+    closed.believed[i] = graph.Sigmas(ids[i]) < kOutlierSigmas;
+  }
+  for (size_t i = 0; i < loops.size(); ++i) {
+    if (!closed.believed[i]) graph.Remove(ids[i]);
+  }
+  if (std::count(closed.believed.begin(), closed.believed.end(), true) == 0) return closed;
+  if (!graph.Solve()) return failed;
+  const std::vector<Matrix4d> covariances = graph.Covariances();
+  if (covariances.empty()) return failed;
+  for (size_t i = 1; i < keyframes.size(); ++i) {
+    closed.keyframes[i] = MovedTo(keyframes[i], poses[i], covariances[i]);
+  }
+  return closed;
+}
+
+}  // namespace camgyro

@@ -1,0 +1,52 @@
+#include "factors/relative_yaw_position.h"
+
+#include <ceres/autodiff_cost_function.h>
+#include <glog/logging.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace camgyro {
+namespace {
+
+class Factor {
+ public:
+  explicit Factor(const RelativeYawPosition& measured) : measured_(measured) {
+    // The root of the inverse; sigmas of metres and microradians may stand beside each other.
+    const Eigen::Vector4d scale = measured.covariance.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::LLT<Eigen::Matrix4d> llt(scale.asDiagonal() * measured.covariance *
+                                          scale.asDiagonal());
+    CHECK(llt.info() == Eigen::Success) << "covariance:\n" << measured.covariance;
+    sqrt_info_ = llt.matrixL().solve(Eigen::Matrix4d(scale.asDiagonal()));
+  }
+
+  template <typename T>
+  bool operator()(const T* pose_a, const T* pose_b, T* residual) const {
+    using std::atan2;
+    using std::cos;
+    using std::sin;
+    const T c = cos(pose_a[3]), s = sin(pose_a[3]);
+    const T x = pose_b[0] - pose_a[0], y = pose_b[1] - pose_a[1], z = pose_b[2] - pose_a[2];
+    const T turn = pose_b[3] - pose_a[3] - measured_.yaw_a_b_rad;
+    Eigen::Matrix<T, 4, 1> error(c * x + s * y - measured_.p_a_b_m.x(),
+                                 c * y - s * x - measured_.p_a_b_m.y(), z - measured_.p_a_b_m.z(),
+                                 atan2(sin(turn), cos(turn)));
+    Eigen::Map<Eigen::Matrix<T, 4, 1>> out(residual);
+    out = sqrt_info_.cast<T>() * error;
+    return true;
+  }
+
+ private:
+  const RelativeYawPosition measured_;
+  Eigen::Matrix4d sqrt_info_;
+};
+
+}  // namespace
+
+std::unique_ptr<ceres::CostFunction> MakeRelativeYawPosition(const RelativeYawPosition& measured) {
+  return std::make_unique<
+      ceres::AutoDiffCostFunction<Factor, 4 /* residual */, 4 /* pose_a */, 4 /* pose_b */>>(
+      new Factor(measured));
+}
+
+}  // namespace camgyro
