@@ -18,12 +18,12 @@ using Eigen::Matrix4d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-constexpr double kLossSigmas = 2.0;
-constexpr double kOutlierSigmas = 5.0;
+constexpr double kLoopLossSigmas = 2.0;
+constexpr double kLoopOutlierSigmas = 5.0;
 // What the window knows of the way between two keyframes at best: far below what it accumulates
 // over seconds, and enough for a covariance that can be inverted.
 constexpr double kLeastWayM = 1e-3, kLeastTurnRad = 1e-4;
-constexpr int kIterations = 100;
+constexpr int kGraphIterations = 100;
 
 // What a change of (position, yaw) does to the state, yaw about the position itself.
 Eigen::Matrix<double, kNavSize, 4> StateByPose(const NavigationState& state) {
@@ -55,7 +55,7 @@ class Graph {
   }
 
   ceres::ResidualBlockId AddLoop(const LoopEdge& loop) {
-    return Add(loop, new ceres::CauchyLoss(kLossSigmas));
+    return Add(loop, new ceres::CauchyLoss(kLoopLossSigmas));
   }
 
   double Sigmas(ceres::ResidualBlockId loop) {
@@ -69,7 +69,7 @@ class Graph {
   bool Solve() {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-    options.max_num_iterations = kIterations;
+    options.max_num_iterations = kGraphIterations;
     options.function_tolerance = 1e-9;
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
@@ -158,7 +158,7 @@ Result<ClosedLoops> CloseLoops(const std::vector<OdometryPose>& keyframes,
   const tl::unexpected<Error> failed = CannotEstimate("the pose graph has no solution");
   if (!graph.Solve()) return failed;
   for (size_t i = 0; i < loops.size(); ++i) {
-    closed.believed[i] = graph.Sigmas(ids[i]) < kOutlierSigmas;
+    closed.believed[i] = graph.Sigmas(ids[i]) < kLoopOutlierSigmas;
   }
   for (size_t i = 0; i < loops.size(); ++i) {
     if (!closed.believed[i]) graph.Remove(ids[i]);
