@@ -7,6 +7,7 @@
 
 #include "core/format.h"
 #include "estimator/odometry/follow_recording.h"
+#include "pipeline/find_loops.h"
 #include "pipeline/frame_times_file.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/result_files.h"
@@ -26,6 +27,9 @@ DECLARE_bool(quiet);
 DEFINE_int32(
     keyframes, 16,
     "keyframes in the sliding window, 6 to 60: more are slower and a little more accurate");
+DEFINE_string(loops, "on",
+              "on: look for places that pictures show again, and close the way there; off: do not, "
+              "as in the experiments of Feng, Li & Dai");
 DEFINE_double(gravity, 0.0,
               "length of gravity where the recording was made [m/s^2]; without: 9.80665");
 DEFINE_string(lever_arm_mm, "0,0,0",
@@ -41,6 +45,9 @@ Result<OdometryOptions> OptionsFromFlags() {
     return BadUsage("--keyframes: expected 6 to 60");
   }
   options.keyframes = FLAGS_keyframes;
+  if (FLAGS_loops != "on" && FLAGS_loops != "off") {
+    return BadUsage("--loops=" + FLAGS_loops + ": expected on or off");
+  }
   if (FLAGS_gravity != 0.0) options.gravity_m_s2 = FLAGS_gravity;
   if (!(options.gravity_m_s2 > 9.0 && options.gravity_m_s2 < 10.5)) {
     return BadUsage("--gravity: expected 9 to 10.5 m/s^2");
@@ -82,7 +89,19 @@ Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
   return run->report.calibration;
 }
 
-std::string Summary(const OdometryRun& run, double recorded_s, double seconds) {
+Result<LoopClosure> LoopsOf(const Recording& recording, const OdometryRun& run, double gravity_m_s2,
+                            ProgressBar* bar) {
+  if (FLAGS_loops == "off") {
+    LoopClosure off;
+    off.unavailable = "--loops=off";
+    off.keyframes = run.keyframes;
+    return off;
+  }
+  return FindLoops(recording, run, gravity_m_s2, [&](double done) { bar->Show("loops", done); });
+}
+
+std::string Summary(const OdometryRun& run, const LoopClosure& loops, double recorded_s,
+                    double seconds) {
   std::string text = "verdict    " + VerdictOf(run) + "\n";
   if (run.segments > 0) {
     const OdometryPose& last = run.poses.back();
@@ -97,6 +116,7 @@ std::string Summary(const OdometryRun& run, double recorded_s, double seconds) {
         Format("lens       %.2f px of noise; camera at (%.3f, %.3f, %.3f) m in the gyro frame\n",
                run.noise_px, run.p_gyro_cam_m.x(), run.p_gyro_cam_m.y(), run.p_gyro_cam_m.z());
   }
+  if (run.segments > 0) text += "loops      " + LoopsInWords(loops) + "\n";
   text += Format("time       %.1f s for %.1f s of recording\n", seconds, recorded_s);
   return text;
 }
@@ -116,6 +136,7 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
   }
   Result<Calibration> calibration = CannotEstimate("");
   Result<OdometryRun> run = CannotEstimate("");
+  Result<LoopClosure> loops = CannotEstimate("");
   double seconds = 0.0;
   {
     ProgressBar bar;
@@ -129,11 +150,13 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
     run =
         FollowRecording(*recording, *calibration, WithDeclaredNoise(*options, recording->gyro_info),
                         [&](double done) { bar.Show("odometry", done); });
+    if (!run) return tl::unexpected(run.error());
+    loops = LoopsOf(*recording, *run, options->gravity_m_s2, &bar);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
-  if (!run) return tl::unexpected(run.error());
+  if (!loops) return tl::unexpected(loops.error());
 
-  const std::string yaml = OdometryYaml(*run);
+  const std::string yaml = OdometryYaml(*run, *loops);
   files.Add("odometry.yaml", yaml);
   if (run->segments > 0) {
     files.Add("trajectory.tum", TrajectoryTum(run->poses));
@@ -141,10 +164,14 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
     files.Add("trajectory.csv", PosesCsv(run->poses));
     files.Add("keyframes.csv", PosesCsv(run->keyframes));
     files.Add("points.ply", PointsPly(run->points));
+    if (loops->Believed() > 0) {
+      files.Add("closed.tum", TrajectoryTum(loops->keyframes));
+      files.Add("closed.csv", PosesCsv(loops->keyframes));
+    }
     const Command command = OdometryCommand();
-    files.Add(
-        "report.html",
-        OdometryReportHtml(*run, {CommandLineOf(command, arguments), DescribeRecording(*recording),
+    files.Add("report.html",
+              OdometryReportHtml(*run, *loops,
+                                 {CommandLineOf(command, arguments), DescribeRecording(*recording),
                                   FlagValues(command), yaml, "odometry.yaml"}));
   }
   if (Status written = files.Write(); !written) return written;
@@ -153,11 +180,12 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
                                 : 1e-9 * static_cast<double>(recording->frames.back().stamp_ns -
                                                              recording->frames.front().stamp_ns);
   if (!FLAGS_quiet) {
-    std::printf("%swritten    %s/odometry.yaml%s\n", Summary(*run, recorded_s, seconds).c_str(),
-                files.folder().c_str(),
+    std::printf("%swritten    %s/odometry.yaml%s%s\n",
+                Summary(*run, *loops, recorded_s, seconds).c_str(), files.folder().c_str(),
                 run->segments > 0 ? ", report.html, trajectory.tum, keyframes.tum, trajectory.csv, "
                                     "keyframes.csv, points.ply"
-                                  : "");
+                                  : "",
+                loops->Believed() > 0 ? ", closed.tum, closed.csv" : "");
   }
   if (run->segments == 0) {
     return CannotEstimate("odometry did not start: " + run->start_explanation);
@@ -175,8 +203,9 @@ Command OdometryCommand() {
       "where the device went: positions, velocities and biases of a recording with an "
       "accelerometer, by a sliding window that knows the rolling shutter and both clocks; without "
       "--calibration the recording is calibrated first";
-  command.flags = {"calibration", "out",     "effects",      "device",
-                   "keyframes",   "gravity", "lever_arm_mm", "lever_arm_sigma_mm"};
+  command.flags = {"calibration", "out",          "effects",
+                   "device",      "keyframes",    "loops",
+                   "gravity",     "lever_arm_mm", "lever_arm_sigma_mm"};
   for (const std::string& flag : InputFlags()) command.flags.push_back(flag);
   command.flags.emplace_back("quiet");
   command.run = RunOdometry;

@@ -45,6 +45,27 @@ void EmitCalibration(YAML::Emitter& out, const OdometryRun& run) {
   out << YAML::EndMap;
 }
 
+void EmitLoops(YAML::Emitter& out, const OdometryRun& run, const LoopClosure& loops) {
+  out << YAML::Key << "loops" << YAML::Value << YAML::BeginMap;
+  out << YAML::Key << "looked_for" << YAML::Value << loops.unavailable.empty();
+  if (!loops.unavailable.empty()) {
+    out << YAML::Key << "reason" << YAML::Value << loops.unavailable;
+  }
+  out << YAML::Key << "candidates" << YAML::Value << loops.candidates;
+  out << YAML::Key << "verified" << YAML::Value << loops.loops.size();
+  out << YAML::Key << "closed" << YAML::Value << loops.Believed();
+  out << YAML::Key << "between" << YAML::Value << YAML::BeginSeq;
+  for (const FoundLoop& loop : loops.loops) {
+    out << YAML::Flow << YAML::BeginMap;
+    out << YAML::Key << "older_ns" << YAML::Value << run.keyframes[loop.edge.older].time_ns;
+    out << YAML::Key << "newer_ns" << YAML::Value << run.keyframes[loop.edge.newer].time_ns;
+    out << YAML::Key << "sightings" << YAML::Value << loop.sightings;
+    Emit(out, "noise_px", loop.noise_px);
+    out << YAML::Key << "closed" << YAML::Value << loop.believed << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+}
+
 }  // namespace
 
 std::string VerdictOf(const OdometryRun& run) {
@@ -58,7 +79,7 @@ std::string VerdictOf(const OdometryRun& run) {
   return ended_lost ? text + ", and not found again" : text + ", and found again";
 }
 
-std::string OdometryYaml(const OdometryRun& run) {
+std::string OdometryYaml(const OdometryRun& run, const LoopClosure& loops) {
   YAML::Emitter out;
   out.SetDoublePrecision(10);
   out << YAML::BeginMap;
@@ -77,7 +98,10 @@ std::string OdometryYaml(const OdometryRun& run) {
     out << YAML::Key << "explanation" << YAML::Value << event.explanation << YAML::EndMap;
   }
   out << YAML::EndSeq;
-  if (run.segments > 0) EmitCalibration(out, run);
+  if (run.segments > 0) {
+    EmitLoops(out, run, loops);
+    EmitCalibration(out, run);
+  }
   out << YAML::EndMap << YAML::Newline;
   return out.c_str();
 }

@@ -6,14 +6,15 @@
 #include <vector>
 
 #include "estimator/odometry/follow_recording.h"
+#include "pipeline/find_loops.h"
 
 namespace camgyro {
 
 // One line for people: whether it followed the device, or why not.
 std::string VerdictOf(const OdometryRun& run);
 
-// odometry.yaml: verdict, events, the calibration as refined.
-std::string OdometryYaml(const OdometryRun& run);
+// odometry.yaml: verdict, events, loops, the calibration as refined.
+std::string OdometryYaml(const OdometryRun& run, const LoopClosure& loops);
 
 // "time x y z qx qy qz qw" [s of the gyro's clock, m]: the gyro frame in the world, z up. The
 // format of the TUM RGB-D benchmark.

@@ -30,6 +30,10 @@ TEST_F(OdometryCommandTest, WritesWhereTheDeviceWent) {
   EXPECT_THAT(ReadFile(Path("b/trajectory.csv")), StartsWith("#time_ns,frame_stamp_ns,segment"));
   EXPECT_THAT(ReadFile(Path("b/points.ply")), StartsWith("ply\n"));
   EXPECT_THAT(ReadFile(Path("b/report.html")), HasSubstr("<polyline"));
+  // Ready tracks have no loops, and nobody looked.
+  EXPECT_THAT(run.out, HasSubstr("loops      not looked for: no pictures"));
+  EXPECT_FALSE(yaml["loops"]["looked_for"].as<bool>());
+  EXPECT_FALSE(Exists("b/closed.tum"));
   // One line per frame from the start on, and one for the names.
   const std::string tum = ReadFile(Path("b/trajectory.tum"));
   EXPECT_EQ(std::count(tum.begin(), tum.end(), '\n'), yaml["frames"].as<int>() + 1);
@@ -46,7 +50,7 @@ TEST_F(OdometryCommandTest, SaysWhatIsMissing) {
   EXPECT_THAT(run.err, HasSubstr("odometry did not start: "));
   EXPECT_THAT(ReadFile(Path("d/odometry.yaml")), HasSubstr("not started"));
   EXPECT_FALSE(Exists("d/trajectory.tum"));
-  for (const char* flag : {"--keyframes=3", "--gravity=1.6", "--lever_arm_mm=1,2",
+  for (const char* flag : {"--keyframes=3", "--gravity=1.6", "--loops=maybe", "--lever_arm_mm=1,2",
                            "--lever_arm_mm=1,2,x", "--lever_arm_sigma_mm=0"}) {
     run = Run(std::string("odometry a --calibration=a/truth.yaml --out=e ") + flag);
     EXPECT_EQ(run.exit_code, 2) << flag;

@@ -39,7 +39,36 @@ double ScaleBar(double extent_m) {
   return decade;
 }
 
-std::string PathSvg(const PathView& view, const OdometryRun& run) {
+std::string Polyline(const PathView& view, const std::vector<OdometryPose>& poses,
+                     const std::string& attributes) {
+  std::string line = "<polyline" + attributes + " points=\"";
+  for (const OdometryPose& pose : poses) {
+    const Vector2d p = OnView(view, pose.state.p_world_m);
+    line += Format("%.3f,%.3f ", p.x(), p.y());
+  }
+  return line + "\"/>";
+}
+
+// The way with its loops closed, and where they are: each between the two places of its keyframes
+// as the odometry has them, which are one.
+std::string LoopsSvg(const PathView& view, const OdometryRun& run, const LoopClosure& loops) {
+  if (loops.loops.empty()) return "";
+  std::string svg = "<g class=\"loops\">";
+  for (const FoundLoop& loop : loops.loops) {
+    const Vector2d a = OnView(view, run.keyframes[loop.edge.older].state.p_world_m);
+    const Vector2d b = OnView(view, run.keyframes[loop.edge.newer].state.p_world_m);
+    svg += Format(
+        "<line%s x1=\"%.3f\" y1=\"%.3f\" x2=\"%.3f\" y2=\"%.3f\"><title>%s of keyframes %zu and "
+        "%zu, %d points</title></line>",
+        loop.believed ? "" : " class=\"left-out\"", a.x(), a.y(), b.x(), b.y(),
+        loop.believed ? "loop" : "loop that is not believed,", loop.edge.older, loop.edge.newer,
+        loop.sightings);
+  }
+  svg += "</g>";
+  return loops.Believed() > 0 ? svg + Polyline(view, loops.keyframes, " class=\"closed\"") : svg;
+}
+
+std::string PathSvg(const PathView& view, const OdometryRun& run, const LoopClosure& loops) {
   Vector2d low = OnView(view, run.keyframes.front().state.p_world_m), high = low;
   for (const OdometryPose& pose : run.keyframes) {
     low = low.cwiseMin(OnView(view, pose.state.p_world_m));
@@ -81,8 +110,8 @@ std::string PathSvg(const PathView& view, const OdometryRun& run) {
   return "<figure><figcaption>" + EscapeHtml(view.title) + "</figcaption>" +
          Format("<svg class=\"map path\" viewBox=\"%.3f %.3f %.3f %.3f\">", low.x(), low.y(),
                 size.x(), size.y()) +
-         "<g class=\"landmarks\">" + points + "</g>" + paths + "<g class=\"start\">" + ends +
-         "</g>" + bar + "</svg></figure>\n";
+         "<g class=\"landmarks\">" + points + "</g>" + paths + LoopsSvg(view, run, loops) +
+         "<g class=\"start\">" + ends + "</g>" + bar + "</svg></figure>\n";
 }
 
 using Component = double (*)(const OdometryPose& pose, int axis);
@@ -172,7 +201,8 @@ ReportSection Calibrated(const OdometryRun& run) {
 
 }  // namespace
 
-std::string OdometryReportHtml(const OdometryRun& run, const RunInfo& info) {
+std::string OdometryReportHtml(const OdometryRun& run, const LoopClosure& loops,
+                               const RunInfo& info) {
   std::vector<std::string> events;
   const int64_t begin_ns = run.poses.front().time_ns;
   for (const OdometryEvent& event : run.events) {
@@ -180,14 +210,17 @@ std::string OdometryReportHtml(const OdometryRun& run, const RunInfo& info) {
                      (event.kind == OdometryEvent::Kind::kStarted ? "started, " : "lost, ") +
                      event.explanation);
   }
+  events.push_back("loops: " + LoopsInWords(loops) +
+                   (loops.Believed() > 0 ? " (green: the way with them)" : ""));
   const std::string lead = Format("%.2f m in %.1f s, %zu keyframes, %zu landmarks", run.path_m,
                                   SecondsSince(begin_ns, run.poses.back().time_ns),
                                   run.keyframes.size(), run.points.size());
   std::vector<ReportSection> sections;
   sections.push_back({"path", "Path",
                       "<div class=\"side-by-side\"><div>" +
-                          PathSvg({"From above: x to the right, y up", 0, 1}, run) + "</div><div>" +
-                          PathSvg({"From the side: x to the right, z up", 0, 2}, run) +
+                          PathSvg({"From above: x to the right, y up", 0, 1}, run, loops) +
+                          "</div><div>" +
+                          PathSvg({"From the side: x to the right, z up", 0, 2}, run, loops) +
                           "</div></div>\n" + BulletList(events)});
   sections.push_back(OverTime(run));
   sections.push_back(Calibrated(run));

@@ -5,13 +5,15 @@
 #include <string>
 
 #include "estimator/odometry/follow_recording.h"
+#include "pipeline/find_loops.h"
 #include "tools/report/calibration_sections.h"
 
 namespace camgyro {
 
-// Path from above and from the side, position and its sigma, speed, biases, tracks, events. The run
-// has at least one pose.
-std::string OdometryReportHtml(const OdometryRun& run, const RunInfo& info);
+// Path from above and from the side with its loops, position and its sigma, speed, biases, tracks,
+// events. The run has at least one pose.
+std::string OdometryReportHtml(const OdometryRun& run, const LoopClosure& loops,
+                               const RunInfo& info);
 
 }  // namespace camgyro
 
