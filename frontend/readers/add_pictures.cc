@@ -1,5 +1,6 @@
 #include "frontend/readers/add_pictures.h"
 
+#include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
 #include "frontend/readers/video_container.h"
 
@@ -21,14 +22,28 @@ Status AddVideo(const std::string& video_file, const std::string& frames_file,
                 const std::string& declared_in, Recording* recording) {
   const Result<VideoContainer> video = ReadVideoContainer(video_file);
   if (!video) return tl::unexpected(video.error());
+  const size_t whole = video->stamps_ns.size();
+  const auto missing = static_cast<size_t>(video->missing_frames);
   if (recording->frames.empty()) {
     for (const int64_t stamp_ns : video->stamps_ns) {
       recording->frames.emplace_back().stamp_ns = stamp_ns;
     }
-  } else if (recording->frames.size() != video->stamps_ns.size()) {
+  } else if (recording->frames.size() != whole + missing) {
     return BadInput(Concat(frames_file, ": has ", recording->frames.size(), " frames, but ",
-                           video_file, " has ", video->stamps_ns.size(),
-                           "; expected the same number"));
+                           video_file, " has ", whole + missing, "; expected the same number"));
+  }
+  if (missing > 0) {
+    std::vector<int> left_out;
+    for (size_t i = whole; i < recording->frames.size(); ++i) {
+      left_out.push_back(static_cast<int>(i));
+    }
+    LeaveOutFrames(left_out, /*repeats=*/false, recording);
+    // The pictures that are used end before those of the file do.
+    for (size_t i = 0; i < whole; ++i) recording->frames[i].picture = static_cast<int>(i);
+    AddFault("video_cut_short", static_cast<int>(missing),
+             Concat(video_file, ": the file is cut short: its first ", whole, " frames are used, ",
+                    missing, " are missing"),
+             recording);
   }
   recording->video_file = video_file;
   if (video->display_rotation_deg != 0) {

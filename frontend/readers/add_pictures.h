@@ -15,7 +15,8 @@ Status SetResolution(int width_px, int height_px, const std::string& file,
 
 // Makes `video` the pictures of the recording. If it has frames (from `frames_file`) they must be
 // as many as the video's; if not, they are the video's, with the container's stamps. A rotation for
-// display is noted, not applied. `declared_in` as above.
+// display is noted, not applied. `declared_in` as above. Of a video that is cut short, what is
+// whole is used: fault video_cut_short.
 Status AddVideo(const std::string& video, const std::string& frames_file,
                 const std::string& declared_in, Recording* recording);
 

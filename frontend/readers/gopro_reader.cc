@@ -234,6 +234,10 @@ void SetStabilisation(const std::map<std::string, std::string>& settings, Record
 Result<Recording> ReadGoPro(const std::string& file) {
   const Result<VideoContainer> video = ReadVideoContainer(file);
   if (!video) return tl::unexpected(video.error());
+  if (video->missing_frames > 0) {
+    return BadInput(Concat(file, ": the file is cut short: ", video->missing_frames,
+                           " frames are missing, and their telemetry"));
+  }
   if (video->gpmf.empty()) {
     return BadInput(Concat(file,
                            ": a video without gyro: it has no GoPro telemetry (GPMF) stream; "

@@ -71,17 +71,24 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
   FfmpegPtr<AVPacket> packet(av_packet_alloc());
   int packets = 0;
   bool cut_short = false;
+  int64_t last_whole_ns = 0;  // in coding order
   int code = 0;
   while ((code = av_read_frame(context->get(), packet.get())) >= 0) {
     const AVStream& stream = *(*context)->streams[packet->stream_index];
     if (packet->stream_index == video_index) {
-      ++packets;
       cut_short = cut_short || (packet->flags & AV_PKT_FLAG_CORRUPT) != 0;
+      if (cut_short) {
+        av_packet_unref(packet.get());
+        continue;
+      }
+      ++packets;
       if (packet->pts == AV_NOPTS_VALUE) {
         return BadInput(Concat(file, ": frame ", packets - 1,
                                " of the video has no time stamp; "
                                "give the stamps in cam0/data.csv and a file that has them all"));
       }
+      last_whole_ns = av_rescale_q(packet->dts == AV_NOPTS_VALUE ? packet->pts : packet->dts,
+                                   stream.time_base, AVRational{1, 1000000000});
       if ((packet->flags & AV_PKT_FLAG_DISCARD) == 0) {  // outside of the edit list: never shown
         result.stamps_ns.push_back(
             av_rescale_q(packet->pts, stream.time_base, AVRational{1, 1000000000}));
@@ -96,11 +103,17 @@ Result<VideoContainer> ReadVideoContainer(const std::string& file) {
     return BadInput(
         Concat(file, ": reading stopped after ", packets, " frames (", FfmpegError(code), ")"));
   }
-  if (cut_short || packets < listed) {
-    return BadInput(Concat(file, ": the file is cut short: its index lists ", listed, " frames, ",
-                           packets, " were found whole"));
-  }
   std::sort(result.stamps_ns.begin(), result.stamps_ns.end());  // packets come in coding order
+  if (cut_short || packets < listed) {
+    // No frame is shown before it is coded: what is lost comes after the last that is coded whole.
+    auto* stamps = &result.stamps_ns;
+    stamps->erase(std::upper_bound(stamps->begin(), stamps->end(), last_whole_ns), stamps->end());
+    if (stamps->empty()) {
+      return BadInput(Concat(file, ": the file is cut short: its index lists ", listed,
+                             " frames, none was found whole"));
+    }
+    result.missing_frames = std::max(1, listed - static_cast<int>(stamps->size()));
+  }
   return result;
 }
 

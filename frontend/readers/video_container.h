@@ -20,11 +20,15 @@ struct VideoContainer {
   int width_px = 0, height_px = 0;  // as coded; a rotation for display is not applied
   int display_rotation_deg = 0;     // of the display matrix, clockwise; 0 without one
   std::vector<int64_t> stamps_ns;   // of the shown frames, from the container's time 0, increasing
-  std::vector<DataPacket> gpmf;     // packets of a GoPro telemetry stream, in order
+  // Of a file that is cut short: frames at its end that are listed but not whole, or that frames
+  // which are not whole may come before. They are not in stamps_ns.
+  int missing_frames = 0;
+  std::vector<DataPacket> gpmf;  // packets of a GoPro telemetry stream, in order
 };
 
-// Reads all packets of a file, without decoding any. Errors: not a video, no video stream, cut
-// short (fewer packets than its index lists), frames without or with repeated stamps.
+// Reads all packets of a file, without decoding any. Errors: not a video (also one that is cut
+// short where its index stands at the end), no video stream, not one whole frame, frames without or
+// with repeated stamps.
 Result<VideoContainer> ReadVideoContainer(const std::string& file);
 
 // Opens a file of a container that holds its pictures itself (MP4 and QuickTime, Matroska, AVI,
