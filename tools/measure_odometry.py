@@ -1,7 +1,8 @@
 #!/usr/bin/python3
-"""Runs `camgyro odometry` where the way is known, and prints the table of docs/lab/odometry.md.
+"""Runs `camgyro odometry` where the way is known, and prints the tables of docs/lab/odometry.md.
 
-    tools/measure_odometry.py [path of camgyro]        (default: build/release/tools/camgyro)
+    tools/measure_odometry.py [path of camgyro]           (default: build/release/tools/camgyro)
+    tools/measure_odometry.py --walks [path of camgyro]   the simulated walks of table 1 instead
 
 Recordings of $CAMGYRO_DATA (default ../shared/data) with the calibration that camgyro finds of them
 (`--effects=radial_distortion,aspect_ratio`), which knows nothing of the truth; then the same with
@@ -11,6 +12,9 @@ the clock as others have it, held:
   rectified   the recording of `camgyro rectify`, delay and readout zero
   searched    the delay of the middle row from `camgyro delay`, as in Feng, Li & Dai, and no readout
   ignored     neither delay nor readout
+
+--walks: tools/scenarios/walk_230m.yaml and walk_400m.yaml as ready tracks, calibrated (no effects:
+the lens has none) and ignored; then the first as a rendered video of 320 x 240 pixels, with loops.
 """
 import os
 import pathlib
@@ -70,9 +74,60 @@ def truth_name(recording):
     return recording.name.replace("rectified_", "")
 
 
+WALKS = {"walk_230m": ("walk_230m", []),
+         "walk_400m": ("walk_400m", []),
+         "video_230m": ("walk_230m", ["video.format=mp4", "camera.resolution=[320, 240]",
+                                      "camera.focal_px=260", "video.max_blur_samples=4"])}
+
+
+def walk_row(name, variant, truth, poses, keyframes, claims):
+    f = figures(truth, poses, keyframes)
+    print(f"| {name} | {variant} | {claims['verdict']} | {f['path_m']:.1f} | {f['rmse_4_m']:.3f} | "
+          f"{f['scale_%']:+.2f} | {f['end_%']:.3f} | {f['nees']:.2f} | "
+          f"{claims.get('loops', {}).get('closed', 0)} |", flush=True)
+
+
+def walk(camgyro, name, folder):
+    scenario, settings = WALKS[name]
+    recording = folder / name
+    run(camgyro, "simulate", SOURCE / f"tools/scenarios/{scenario}.yaml", *settings,
+        f"--out={recording}").check_returncode()
+    if "video.format=mp4" in settings:  # tracked once for all that follows
+        run(camgyro, "track", recording, f"--out={recording}").check_returncode()
+    truth = Truth(recording / "truth_trajectory.tum")
+    run(camgyro, "calibrate", recording, f"--out={folder}/cal_{name}").check_returncode()
+    calibration = folder / f"cal_{name}/calibration.yaml"
+    held(calibration, 0, 0, folder / "zero.yaml")
+    for variant, used in (("calibrated", calibration), ("ignored", folder / "zero.yaml")):
+        out = folder / f"{name}_{variant}"
+        answer = run(camgyro, "odometry", recording, f"--calibration={used}", f"--out={out}")
+        if not (out / "keyframes.csv").exists():
+            print(f"| {name} | {variant} | " + answer.stdout.strip().splitlines()[-1] + " |" * 7,
+                  flush=True)
+            continue
+        claims = yaml.safe_load((out / "odometry.yaml").read_text(encoding="utf-8"))
+        keyframes = Poses(out / "keyframes.csv")
+        walk_row(name, variant, truth, Poses(out / "trajectory.csv"), keyframes,
+                 {"verdict": claims["verdict"]})
+        if (out / "closed.csv").exists():
+            walk_row(name, variant + ", loops", truth, Poses(out / "closed.csv"), keyframes, claims)
+
+
+def walks(camgyro):
+    print("| Walk | clock | verdict | path [m] | rmse [m] | scale [%] | end [%] | NEES | loops |\n|"
+          + " --- |" * 9, flush=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        for name in WALKS:
+            walk(camgyro, name, pathlib.Path(temporary))
+
+
 def main():
-    camgyro = pathlib.Path(sys.argv[1] if len(sys.argv) > 1
+    paths = [argument for argument in sys.argv[1:] if argument != "--walks"]
+    camgyro = pathlib.Path(paths[0] if paths
                            else SOURCE / "build/release/tools/camgyro").resolve()
+    if "--walks" in sys.argv:
+        walks(camgyro)
+        return
     print("| Recording | clock | verdict | path [m] | online [m] | window [m] | scale [%] | "
           "5 m [%] | end [%] | NEES | frames/s |\n|" + " --- |" * 11, flush=True)
     with tempfile.TemporaryDirectory() as temporary:
