@@ -24,6 +24,8 @@ constexpr double kLoopOutlierSigmas = 5.0;
 // over seconds, and enough for a covariance that can be inverted.
 constexpr double kLeastWayM = 1e-3, kLeastTurnRad = 1e-4;
 constexpr int kGraphIterations = 100;
+// A sum of squares this many of its standard deviations above what it should be is no chance.
+constexpr double kChanceSigmas = 3.0;
 
 // What a change of (position, yaw) does to the state, yaw about the position itself.
 Eigen::Matrix<double, kNavSize, 4> StateByPose(const NavigationState& state) {
@@ -76,6 +78,13 @@ class Graph {
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);
     return summary.IsSolutionUsable();
+  }
+
+  // Of ways and loops, with the loops' loss.
+  double ChiSquared() {
+    double half = 0.0;
+    problem_.Evaluate({}, &half, nullptr, nullptr, nullptr);
+    return 2.0 * half;
   }
 
   // Of every keyframe but the first, which is the frame of all; empty if it cannot be had.
@@ -163,12 +172,18 @@ Result<ClosedLoops> CloseLoops(const std::vector<OdometryPose>& keyframes,
   for (size_t i = 0; i < loops.size(); ++i) {
     if (!closed.believed[i]) graph.Remove(ids[i]);
   }
-  if (std::count(closed.believed.begin(), closed.believed.end(), true) == 0) return closed;
+  const auto believed = std::count(closed.believed.begin(), closed.believed.end(), true);
+  if (believed == 0) return closed;
   if (!graph.Solve()) return failed;
   const std::vector<Matrix4d> covariances = graph.Covariances();
   if (covariances.empty()) return failed;
+  // Each loop brings four residuals, and all else is determined without it.
+  const double dof = 4.0 * static_cast<double>(believed), chi_squared = graph.ChiSquared();
+  closed.variance_factor = chi_squared / dof;
+  const bool by_chance = chi_squared < dof + kChanceSigmas * std::sqrt(2.0 * dof);
+  const double widening = by_chance ? 1.0 : closed.variance_factor;
   for (size_t i = 1; i < keyframes.size(); ++i) {
-    closed.keyframes[i] = MovedTo(keyframes[i], poses[i], covariances[i]);
+    closed.keyframes[i] = MovedTo(keyframes[i], poses[i], widening * covariances[i]);
   }
   return closed;
 }

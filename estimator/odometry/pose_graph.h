@@ -28,6 +28,9 @@ struct ClosedLoops {
   // was if no loop is believed.
   std::vector<OdometryPose> keyframes;
   std::vector<bool> believed;  // of the loops, in their order
+  // Of all residuals in sigmas, per loop's four: 1 if odometry and loops are as good as they say.
+  // The sigmas have been multiplied by its root where it is beyond what chance makes of 1.
+  double variance_factor = 1.0;
 };
 
 // The way from keyframe i to i + 1 as the odometry has it. Its covariance is the increment that
@@ -39,8 +42,9 @@ RelativeYawPosition WayBetween(const OdometryPose& a, const OdometryPose& b);
 
 // The most likely poses of keyframes (by time) given both. Loops are weighed down by a Cauchy loss
 // at 2 sigma; those that are beyond 5 sigma then are not believed and leave. The covariance counts
-// loops as independent of each other. Errors: kBadInput for a loop between keyframes that are not
-// there or not in order; kCannotEstimate if Ceres finds no solution.
+// loops as independent of each other; it is widened where they contradict the odometry. Errors:
+// kBadInput for a loop between keyframes that are not there or not in order; kCannotEstimate if
+// Ceres finds no solution.
 Result<ClosedLoops> CloseLoops(const std::vector<OdometryPose>& keyframes,
                                const std::vector<LoopEdge>& loops);
 

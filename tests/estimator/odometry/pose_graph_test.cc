@@ -205,6 +205,28 @@ TEST(PoseGraph, CovarianceIsHonest) {
   EXPECT_LT(without, 1.29);
 }
 
+// An odometry that claims sigmas four times too small is found out by its loops.
+TEST(PoseGraph, SigmasAreWidenedWhereLoopsContradictThem) {
+  double nees = 0.0, factor = 0.0;
+  constexpr int kWays = 30;
+  for (uint64_t seed = 1; seed <= kWays; ++seed) {
+    Way way(300 + seed);
+    for (OdometryPose& pose : way.odometry) pose.covariance /= 16.0;
+    std::vector<LoopEdge> loops;
+    for (size_t i = 0; i < kLap; i += 2) loops.push_back(way.Loop(i, i + kLap));
+    const auto closed = CloseLoops(way.odometry, loops);
+    ASSERT_TRUE(closed);
+    factor += closed->variance_factor / kWays;
+    const size_t last = way.truth.size() - 1;
+    const OdometryPose& pose = closed->keyframes[last];
+    const Vector3d e = pose.state.p_world_m - way.truth[last].state.p_world_m;
+    const auto C = pose.covariance.block<3, 3>(kNavPosition, kNavPosition);
+    nees += e.dot(C.ldlt().solve(e)) / 3.0 / kWays;
+  }
+  EXPECT_GT(factor, 2.0);
+  EXPECT_LT(nees, 10.0);  // without the factor: of the order of 16
+}
+
 TEST(PoseGraph, RefusesLoopsBetweenKeyframesThatAreNotThere) {
   const Way way(6);
   EXPECT_FALSE(CloseLoops(way.odometry, {{5, 5, {}}}));
