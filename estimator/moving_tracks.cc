@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -121,6 +122,19 @@ std::vector<TimedPair> WithoutTracks(const std::vector<TimedPair>& pairs,
   return kept;
 }
 
+namespace {
+
+// Sets of ascending ids. What comes and goes at the threshold is not worth another fit.
+bool AlmostTheSame(const std::vector<int64_t>& a, const std::vector<int64_t>& b) {
+  constexpr double kShare = 0.1;
+  std::vector<int64_t> differ;
+  std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(differ));
+  return static_cast<double>(differ.size()) <=
+         kShare * static_cast<double>(std::max(a.size(), b.size()));
+}
+
+}  // namespace
+
 Result<StillFit> FitWhatIsStill(const EstimationInput& input, std::vector<TimedPair> pairs,
                                 const PairGraphOptions& options, const FitOfPairs& fit) {
   Result<Refined> first = fit(pairs, nullptr);
@@ -137,7 +151,7 @@ Result<StillFit> FitWhatIsStill(const EstimationInput& input, std::vector<TimedP
     const std::vector<TrackLean> leans =
         LeanOfTracks(input, pairs, still.fit.calibration, still.fit.quality.noise_px, options);
     std::vector<int64_t> moving = MovingTracks(leans);
-    if (moving == left_out) break;
+    if (AlmostTheSame(moving, left_out)) break;
     std::vector<TimedPair> at_rest = WithoutTracks(pairs, moving);
     Result<Refined> next = fit(at_rest, &still.fit);
     if (!next) break;
