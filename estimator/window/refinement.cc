@@ -114,9 +114,6 @@ bool SameScale(double before, double after) { return std::abs(after / before - 1
 constexpr double kSettledStep = 0.1;
 // And of a round, with its new directions.
 constexpr double kSettledRound = 0.3;
-// In a round: at first it is not known what a sigma is, then where the noise scale ends.
-constexpr int kFirstSteps = 3, kStepsWithoutScale = 6, kMostSteps = 30;
-
 constexpr int kLeastPairs = 10;
 
 // How far two states are apart, with their effects, in sigmas: the Mahalanobis distance.
@@ -233,13 +230,17 @@ class Refinement {
     for (const int64_t id : ids_) graph_->SetSigma(id, scale_);
   }
 
-  // The state decides when to stop: the directions of pairs that hardly determine theirs creep
-  // along flat valleys, for dozens of steps that move nothing else.
+  // Where the noise scale has settled, the state decides when to stop: the directions of pairs that
+  // hardly determine theirs creep along flat valleys, for dozens of steps that move nothing else.
+  // Before, what is a sigma may still change a lot: with a lens that is far off, for example.
   SolveReport Solve() {
-    SolveOptions options{kFirstSteps, 1e-5, kCostTolerance};
+    SolveOptions options{30, 1e-5, kCostTolerance};
+    yardstick_.reset();
+    if (scale_settled_) {
+      if (const auto covariance = graph_->NoiseCovariance()) yardstick_.emplace(*covariance);
+    }
     Calibration last = graph_->Estimate();
     if (yardstick_) {
-      options.max_iterations = scale_settled_ ? kMostSteps : kStepsWithoutScale;
       options.settled = [&] {
         const Calibration now = graph_->Estimate();
         const double step = yardstick_->Distance(last, now);
@@ -247,11 +248,7 @@ class Refinement {
         return step < kSettledStep;
       };
     }
-    const SolveReport report = graph_->Solve(options);
-    if (report.usable && !yardstick_) {
-      if (const auto covariance = graph_->NoiseCovariance()) yardstick_.emplace(*covariance);
-    }
-    return report;
+    return graph_->Solve(options);
   }
 
   std::vector<std::vector<double>> AllResiduals(bool search) {

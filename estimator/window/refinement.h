@@ -16,7 +16,7 @@ namespace camgyro {
 
 struct RefinementOptions {
   PairGraphOptions graph;
-  int max_rounds = 8;      // noise scale, directions and solve, until the estimate settles
+  int max_rounds = 6;      // noise scale, directions and solve, until the estimate settles
   double cluster_s = 2.0;  // stretches of the clustered covariance
 };
 
