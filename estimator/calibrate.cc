@@ -338,35 +338,44 @@ class CalibrationJob {
       }
     }
     if (!refined) return tl::unexpected(refined.error());
-    LeaveOutWhatMoves(refinement, &*refined);
+    const Halves halves = LeaveOutWhatMoves(refinement, &*refined);
     report_.calibration = refined->calibration;
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;
     report_.frame_times = refined->frame_times;
     report_.converged = refined->converged;
     Tell("refinement", 0.6);
-    TakeHalves(FitHalves(refinement, *refined));
+    TakeHalves(halves);
     clock_.Finish("refinement");
     return {};
   }
 
-  // Refits without the tracks that move, if there are any.
-  void LeaveOutWhatMoves(const RefinementOptions& options, Refined* refined) {
+  // Refits without the tracks that move, if there are any. Returns the halves of the fit that is
+  // taken: that of all tracks also where the halves disagree without the movers as well, since what
+  // contradicts itself then is the model, and leaving out what it does not explain would hide it.
+  Halves LeaveOutWhatMoves(const RefinementOptions& options, Refined* refined) {
+    const std::vector<TimedPair> all = refined_pairs_;
     const Result<StillFit> still = FitWhatIsStill(
-        input_, refined_pairs_, options.graph,
+        input_, all, options.graph,
         [&](const std::vector<TimedPair>& pairs, const Refined* before) -> Result<Refined> {
           if (before == nullptr) return *refined;
           refined_pairs_ = pairs;
           return RefineWith(options, before->calibration, before->quality.noise_px);
         });
-    if (!still) return;
-    *refined = still->fit;
-    refined_pairs_ = still->pairs;
-    if (still->moving == 0) return;
-    report_.moving_tracks = still->moving;
-    report_.notes.push_back(
-        Format("%d of %d tracks keep to one side, as of things that move: left out", still->moving,
-               still->tracks));
+    if (still && still->moving > 0) {
+      refined_pairs_ = still->pairs;
+      const Halves halves = FitHalves(options, still->fit);
+      if (!(halves.chi2 > kHalvesLimit)) {
+        *refined = still->fit;
+        report_.moving_tracks = still->moving;
+        report_.notes.push_back(
+            Format("%d of %d tracks keep to one side, as of things that move: left out",
+                   still->moving, still->tracks));
+        return halves;
+      }
+    }
+    refined_pairs_ = all;
+    return FitHalves(options, *refined);
   }
 
   void TakeHalves(const Halves& halves) {

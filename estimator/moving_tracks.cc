@@ -52,6 +52,15 @@ struct Sums {
 double PValue(double chi2) { return std::exp(-0.5 * chi2); }
 double Quantile(double share) { return -2.0 * std::log(1.0 - share); }
 
+// Sets of ascending ids. What comes and goes at the threshold is not worth another fit.
+bool AlmostTheSame(const std::vector<int64_t>& a, const std::vector<int64_t>& b) {
+  constexpr double kShare = 0.1;
+  std::vector<int64_t> differ;
+  std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(differ));
+  return static_cast<double>(differ.size()) <=
+         kShare * static_cast<double>(std::max(a.size(), b.size()));
+}
+
 }  // namespace
 
 std::vector<TrackLean> LeanOfTracks(const EstimationInput& input,
@@ -75,8 +84,7 @@ std::vector<TrackLean> LeanOfTracks(const EstimationInput& input,
     }
   }
   std::vector<TrackLean> leans;
-  constexpr double kAlmostNothing =
-      1e-9;  // keeps lines that are all parallel from dividing by zero
+  constexpr double kAlmostNothing = 1e-9;  // lines that are all parallel: no division by zero
   for (const auto& [track_id, sums] : tracks) {
     if (sums.matches < TrackLean::kLeastMatches) continue;
     const Eigen::Matrix2d covariance =
@@ -121,19 +129,6 @@ std::vector<TimedPair> WithoutTracks(const std::vector<TimedPair>& pairs,
   }
   return kept;
 }
-
-namespace {
-
-// Sets of ascending ids. What comes and goes at the threshold is not worth another fit.
-bool AlmostTheSame(const std::vector<int64_t>& a, const std::vector<int64_t>& b) {
-  constexpr double kShare = 0.1;
-  std::vector<int64_t> differ;
-  std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(differ));
-  return static_cast<double>(differ.size()) <=
-         kShare * static_cast<double>(std::max(a.size(), b.size()));
-}
-
-}  // namespace
 
 Result<StillFit> FitWhatIsStill(const EstimationInput& input, std::vector<TimedPair> pairs,
                                 const PairGraphOptions& options, const FitOfPairs& fit) {
