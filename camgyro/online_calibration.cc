@@ -39,7 +39,20 @@ void OnlineCalibration::AddGyro(const GyroSample& sample) {
          SecondsSince(gyro_.front().stamp_ns, sample.stamp_ns) > keep_s) {
     gyro_.pop_front();
   }
-  if (window_) ProcessWaiting();
+  if (window_) {
+    ProcessWaiting();
+  } else if (lacks_gyro_ && GyroSpan() >= FrameSpan()) {  // it came after the frames
+    Collect();
+    listener_(progress_);
+  }
+}
+
+double OnlineCalibration::GyroSpan() const {
+  return gyro_.empty() ? 0.0 : SecondsSince(gyro_.front().stamp_ns, gyro_.back().stamp_ns);
+}
+
+double OnlineCalibration::FrameSpan() const {
+  return SecondsSince(frames_.front().stamp_ns, frames_.back().stamp_ns);
 }
 
 void OnlineCalibration::AddFrame(OnlineFrame frame) {
@@ -56,10 +69,10 @@ void OnlineCalibration::Collect() {
          frames_.size() > 10 * kMaxWaiting) {
     frames_.pop_front();
   }
-  const double span_s = SecondsSince(frames_.front().stamp_ns, newest_ns);
-  if (span_s < start_s_ || newest_ns < next_start_ns_) return;
-  if (gyro_.size() < 2 ||
-      SecondsSince(gyro_.front().stamp_ns, gyro_.back().stamp_ns) < 0.5 * span_s) {
+  lacks_gyro_ = false;
+  if (FrameSpan() < start_s_ || newest_ns < next_start_ns_) return;
+  lacks_gyro_ = GyroSpan() < 0.5 * FrameSpan();
+  if (lacks_gyro_) {
     progress_.message = "there are frames, but hardly any gyro samples";
     return;
   }

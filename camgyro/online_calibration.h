@@ -48,6 +48,9 @@ class OnlineCalibration {
 
  private:
   void Collect();
+  // Of the gyro's samples and of the frames that are here [s].
+  double GyroSpan() const;
+  double FrameSpan() const;
   Status TryStart();
   void ProcessWaiting();
   bool AddPair(const OnlineFrame& a, const OnlineFrame& b);
@@ -65,6 +68,7 @@ class OnlineCalibration {
   std::deque<GyroSample> gyro_;     // not yet in the window
   std::deque<OnlineFrame> frames_;  // collected, or waiting for the gyro; the first was used
   int64_t next_start_ns_ = 0;       // camera clock: no search before
+  bool lacks_gyro_ = false;         // for the search that is due
   std::optional<SlidingWindow> window_;
   int gap_ = 1;                                    // of the pairs, at most; see SelectPairs
   uint64_t used_before_ = 0, skipped_before_ = 0;  // by windows that were given up

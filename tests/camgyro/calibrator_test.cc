@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -158,6 +160,22 @@ TEST(Calibrator, WithoutMotionItSaysWhy) {
   EXPECT_EQ(calibrator->InitialiseVins({}).verdict, VinsVerdict::kNoCalibration);
 }
 
+TEST(Calibrator, GyroThatComesAfterTheFramesIsUsed) {
+  const Scenario scenario = LivelyScenario(7.0);
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const Recording& r = s.recording;
+  const auto calibrator = Make(OptionsFor(scenario));
+  for (size_t i = 0; i < r.frames.size(); ++i) Add(calibrator.get(), r, i);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  EXPECT_THAT(calibrator->snapshot()->message, testing::HasSubstr("hardly any gyro samples"));
+  for (const GyroSample& sample : r.gyro) Add(calibrator.get(), sample);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  EXPECT_LT(Sigmas(snapshot->calibration.delay_s, s.truth.delay_s, snapshot->parameters[kDelay]),
+            5.0);
+}
+
 TEST(Calibrator, GyroThatNeverComesIsNamed) {
   const Scenario scenario = LivelyScenario(6.0);
   const Simulated s = simulation::SimulateTracks(scenario).value();
@@ -234,17 +252,35 @@ TEST(Calibrator, ProducersAndReaderMayRunAtTheSameTime) {
   const auto calibrator = Make(OptionsFor(scenario));
   std::atomic<bool> done{false};
   std::atomic<int> refused{0};
+  // As sensors do, no stream runs ahead of the others for long.
+  constexpr int64_t kAheadNs = 200'000'000;
+  constexpr int64_t kEnd = std::numeric_limits<int64_t>::max();
+  std::array<std::atomic<int64_t>, 3> at_ns{};
+  const auto produce = [&](size_t stream, size_t count, const auto& stamp_ns, const auto& add) {
+    for (size_t i = 0; i < count; ++i) {
+      at_ns[stream] = stamp_ns(i);
+      while (std::any_of(at_ns.begin(), at_ns.end(),
+                         [&](const auto& other) { return other < at_ns[stream] - kAheadNs; })) {
+        std::this_thread::yield();
+      }
+      refused += add(i) != AddResult::kAccepted;
+    }
+    at_ns[stream] = kEnd;
+  };
   std::thread gyro([&] {
-    for (const GyroSample& x : r.gyro) refused += Add(calibrator.get(), x) != AddResult::kAccepted;
+    produce(
+        0, r.gyro.size(), [&](size_t i) { return r.gyro[i].stamp_ns; },
+        [&](size_t i) { return Add(calibrator.get(), r.gyro[i]); });
   });
   std::thread accel([&] {
-    for (const AccelSample& x : r.accel)
-      refused += Add(calibrator.get(), x) != AddResult::kAccepted;
+    produce(
+        1, r.accel.size(), [&](size_t i) { return r.accel[i].stamp_ns; },
+        [&](size_t i) { return Add(calibrator.get(), r.accel[i]); });
   });
   std::thread frames([&] {
-    for (size_t i = 0; i < r.frames.size(); ++i) {
-      refused += Add(calibrator.get(), r, i) != AddResult::kAccepted;
-    }
+    produce(
+        2, r.frames.size(), [&](size_t i) { return r.frames[i].stamp_ns; },
+        [&](size_t i) { return Add(calibrator.get(), r, i); });
   });
   std::thread reader([&] {
     uint64_t before = 0;
