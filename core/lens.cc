@@ -35,10 +35,11 @@ Radial AngleOverRadius(double t) {
 // theta^(2k+1) / r = c^(2k+1) t^k for k = 1..4: the factors of kb1..kb4.
 std::array<Radial, 4> AngleSeries(const Radial& c, double t) {
   std::array<Radial, 4> series;
-  for (int k = 1; k <= 4; ++k) {
+  const double c_sq = c.value * c.value;
+  double p2 = c.value, t2 = 0.0, t1 = 1.0;  // c^(2k-1), (t^k)'' / (k (k - 1)), t^(k-1)
+  for (int k = 1; k <= 4; ++k, p2 *= c_sq, t2 = t1, t1 *= t) {
     const int n = 2 * k + 1;
-    const double p2 = std::pow(c.value, n - 2), p1 = p2 * c.value, p0 = p1 * c.value;
-    const double t2 = k > 1 ? std::pow(t, k - 2) : 0.0, t1 = k > 1 ? t2 * t : 1.0, t0 = t1 * t;
+    const double p1 = p2 * c.value, p0 = p1 * c.value, t0 = t1 * t;
     const double p_slope = n * p1 * c.slope;
     Radial& m = series[static_cast<size_t>(k - 1)];
     m.value = p0 * t0;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include "core/format.h"
@@ -289,16 +290,22 @@ class CalibrationJob {
   }
 
   Result<Refined> RefineWith(RefinementOptions options, const Calibration& from,
-                             std::optional<double> noise) const {
+                             std::optional<double> noise,
+                             std::shared_ptr<const PairLatents> latents = nullptr) const {
     options.graph.sigma = noise;
+    options.latents = std::move(latents);
     return Refine(input_, refined_pairs_, from, report_.prior, options);
   }
 
+  // From where another fit ended.
+  Result<Refined> RefineFrom(const Refined& fit, const RefinementOptions& options) const {
+    return RefineWith(options, fit.calibration, fit.quality.noise_px, fit.latents);
+  }
+
   // Each half alone, from the fit of the whole: it is near, and a half that disagrees leaves it.
-  Halves FitHalves(RefinementOptions options, const Refined& whole) const {
+  Halves FitHalves(const RefinementOptions& options, const Refined& whole) const {
     if (static_cast<int>(refined_pairs_.size()) < kMinPairsForUnseen) return {};
-    options.graph.sigma = whole.quality.noise_px;
-    HalvesFit fit(input_, refined_pairs_, whole.calibration, report_.prior, options);
+    HalvesFit fit(input_, refined_pairs_, whole, report_.prior, options);
     ParallelFor(2, [&](size_t half) { fit.Fit(half); });
     return fit.Compare();
   }
@@ -318,8 +325,8 @@ class CalibrationJob {
                     [](const auto& item) { return item.effect->depends_on_calibration(); })) {
       const Result<Refined> first = RefineWith(refinement, from, refinement.graph.sigma);
       if (!first) return tl::unexpected(first.error());
-      from = SettleEffects(recording_, *first, [&](const Calibration& start, double noise) {
-               return RefineWith(refinement, start, noise);
+      from = SettleEffects(recording_, *first, [&](const Refined& fit) {
+               return RefineFrom(fit, refinement);
              }).calibration;
     }
     Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
@@ -360,7 +367,7 @@ class CalibrationJob {
         [&](const std::vector<TimedPair>& pairs, const Refined* before) -> Result<Refined> {
           if (before == nullptr) return *refined;
           refined_pairs_ = pairs;
-          return RefineWith(options, before->calibration, before->quality.noise_px);
+          return RefineFrom(*before, options);
         });
     if (still && still->moving > 0) {
       refined_pairs_ = still->pairs;

@@ -23,9 +23,8 @@ double HalvesChi2(const Calibration& first, const Calibration& second) {
 }  // namespace
 
 HalvesFit::HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-                     const Calibration& from, const Prior& prior,
-                     const RefinementOptions& refinement)
-    : input_(input), from_(from), prior_(prior), refinement_(refinement) {
+                     const Refined& whole, const Prior& prior, const RefinementOptions& refinement)
+    : input_(input), whole_(whole), prior_(prior), refinement_(refinement) {
   const auto middle = pairs.begin() + static_cast<std::ptrdiff_t>(pairs.size() / 2);
   halves_[0].assign(pairs.begin(), middle);
   for (auto pair = middle; pair != pairs.end(); ++pair) {
@@ -37,7 +36,9 @@ void HalvesFit::Fit(size_t half) {
   RefinementOptions options = refinement_;
   options.max_rounds = std::min(4, refinement_.max_rounds);
   options.cluster_s = 0.5 * refinement_.cluster_s;
-  const Result<Refined> fit = Refine(input_, halves_.at(half), from_, prior_, options);
+  options.graph.sigma = whole_.quality.noise_px;
+  options.latents = whole_.latents;
+  const Result<Refined> fit = Refine(input_, halves_.at(half), whole_.calibration, prior_, options);
   if (!fit) return;
   fits_.at(half) = fit->calibration;
   const std::vector<TimedPair>& other = halves_.at(1 - half);

@@ -25,13 +25,13 @@ struct Halves {
   std::optional<UnseenFit> unseen;
 };
 
-// Each half of the pairs is fitted alone, and the other one tells how well. The pairs across the
-// middle belong to neither, so that no frame is in both.
+// Each half of the pairs is fitted alone, from a fit of them all, and the other one tells how well.
+// The pairs across the middle belong to neither, so that no frame is in both.
 class HalvesFit {
  public:
   // The arguments have to outlive this.
-  HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-            const Calibration& from, const Prior& prior, const RefinementOptions& refinement);
+  HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs, const Refined& whole,
+            const Prior& prior, const RefinementOptions& refinement);
   // Fits half 0 or 1: beside the other, if it likes to.
   void Fit(size_t half);
   // Once both are fitted.
@@ -39,7 +39,7 @@ class HalvesFit {
 
  private:
   const EstimationInput& input_;
-  const Calibration& from_;
+  const Refined& whole_;
   const Prior& prior_;
   const RefinementOptions& refinement_;
   std::array<std::vector<TimedPair>, 2> halves_;

@@ -140,7 +140,7 @@ class Contest {
     Result<Refined> fit = FitWith(r, candidate);
     if (fit && candidate.entry->step_at && fits_.PlaceSteps(noise_, &fit->calibration)) {
       r.shape = fit->calibration.effects->items().back().shape;
-      fit = fits_.Fit(fit->calibration, noise_);
+      fit = fits_.Fit(fit->calibration, noise_, fit->latents);
     }
     if (!fit) {
       r.rejected = "the fit with it failed: " + fit.error().message;

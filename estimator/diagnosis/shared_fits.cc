@@ -44,18 +44,21 @@ std::vector<PairBlock> SharedFits::SeenBlocks() const {
   return blocks;
 }
 
-Result<Refined> SharedFits::Fit(const Calibration& start, double noise) const {
+Result<Refined> SharedFits::Fit(const Calibration& start, double noise,
+                                std::shared_ptr<const PairLatents> latents) const {
   RefinementOptions refinement = options_.calibrate.refinement;
   refinement.graph = in_.graph;
   refinement.graph.sigma = noise;
   refinement.cluster_s = shares_.block_s;
   refinement.max_rounds = kFitRounds;
+  refinement.latents = std::move(latents);
   return Refine(input_, Joined(shares_.fit), start, in_.prior, refinement);
 }
 
 Refined SharedFits::Settle(Refined fit) const {
-  return SettleEffects(*in_.recording, std::move(fit),
-                       [this](const Calibration& from, double noise) { return Fit(from, noise); });
+  return SettleEffects(*in_.recording, std::move(fit), [this](const Refined& from) {
+    return Fit(from.calibration, from.quality.noise_px, from.latents);
+  });
 }
 
 bool SharedFits::PlaceSteps(double noise, Calibration* calibration) const {

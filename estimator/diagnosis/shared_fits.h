@@ -28,8 +28,9 @@ class SharedFits {
   // Stretches of the fit and the choice share together, those that have pairs, in time order.
   std::vector<PairBlock> SeenBlocks() const;
 
-  // A fit of the fit share. noise: first guess.
-  Result<Refined> Fit(const Calibration& start, double noise) const;
+  // A fit of the fit share. noise: first guess. latents: of a fit of the share near the start.
+  Result<Refined> Fit(const Calibration& start, double noise,
+                      std::shared_ptr<const PairLatents> latents = nullptr) const;
   // Effects that depend on the calibration made anew until it settles.
   Refined Settle(Refined fit) const;
   // Puts steps of the delay where the fit and the choice share have them, to within a pair or a gap

@@ -28,8 +28,10 @@ bool ChangeTheLens(const EffectSet* effects) {
 
 }  // namespace
 
-PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGraphOptions& options)
+PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGraphOptions& options,
+                     std::shared_ptr<const PairLatents> latents)
     : options_(options),
+      start_(std::move(latents)),
       prior_mean_(prior.mean),
       effects_(WithParameters(start)),
       rates_(options, prior, start.bias_gyro_rad_s, effects_),
@@ -214,8 +216,13 @@ bool PairGraph::KeepMatches(const RateGroups::Cover& cover, PairMeasurement* pai
 }
 
 void PairGraph::AddDirection(int64_t id, Pair* pair) {
-  graph_.AddBlock(DirectionBlock(id), {Geometry::kDirection, Eigen::Vector3d::UnitZ(), {}});
-  graph_.AddBlock(BendBlock(id), {Geometry::kEuclidean, BendVector::Zero(), {}});
+  PairPlane plane{Eigen::Vector3d::UnitZ(), BendVector::Zero()};
+  if (start_ != nullptr) {
+    const auto known = start_->planes.find(id);
+    if (known != start_->planes.end()) plane = known->second;
+  }
+  graph_.AddBlock(DirectionBlock(id), {Geometry::kDirection, plane.tau, {}});
+  graph_.AddBlock(BendBlock(id), {Geometry::kEuclidean, plane.bend, {}});
   PairMeasurement& m = *pair->measurement;
   const double readout_s = graph_.value(kShutterBlock)[kReadout];
   const double gap_s = m.frame_b.stamp_s - m.frame_a.stamp_s;

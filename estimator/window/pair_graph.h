@@ -16,6 +16,7 @@
 #include "estimator/window/factor_graph.h"
 #include "estimator/window/frame_times.h"
 #include "estimator/window/pair_graph_options.h"
+#include "estimator/window/pair_view.h"
 #include "estimator/window/rate_groups.h"
 #include "estimator/window/timed_pair.h"
 #include "factors/coplanarity_plane.h"
@@ -47,13 +48,22 @@ struct CrossFit {
   }
 };
 
+// What a graph has found for each pair and frame: where another fit of them begins.
+struct PairLatents {
+  std::map<int64_t, PairPlane> planes;      // by pair
+  std::map<int64_t, double> frame_times_s;  // by PairGraph::FrameNumber
+};
+
 class PairGraph {
  public:
   static constexpr int kMinMatches = 8;
 
   // start: values with effects. prior: of the values without effects (zero bias, guess of the
   // files, ...); its sigmas are positive (CHECKed). Each effect brings a prior of its own.
-  PairGraph(const Calibration& start, const Prior& prior, const PairGraphOptions& options);
+  // latents: where pairs start that it has; it is read while pairs are added. null: directions are
+  // searched, and frames' times start at zero.
+  PairGraph(const Calibration& start, const Prior& prior, const PairGraphOptions& options,
+            std::shared_ptr<const PairLatents> latents = nullptr);
 
   // Samples in time order (CHECKed).
   void AddRate(const TimedRate& rate) { rates_.Add(rate); }
@@ -98,6 +108,7 @@ class PairGraph {
   // residual depends on.
   void SetFrameTimeSpread(const Spread& spread);
   double frame_time_spread_s() const { return *frame_time_spread_s_; }
+  PairLatents Latents() const;
 
   // The estimate. With covariance: of the present graph, inflated by the clustered (sandwich)
   // covariance where that is larger; `cluster_s` is the length of a cluster, and there must be at
@@ -154,6 +165,7 @@ class PairGraph {
   double RateMargin() const;
 
   PairGraphOptions options_;
+  std::shared_ptr<const PairLatents> start_;
   Calibration prior_mean_;                    // with the effects of the start
   std::shared_ptr<const EffectSet> effects_;  // null without effects that have parameters
   FactorGraph graph_;

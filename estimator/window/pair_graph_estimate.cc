@@ -113,6 +113,19 @@ Calibration PairGraph::Estimate() const {
   return c;
 }
 
+PairLatents PairGraph::Latents() const {
+  PairLatents latents;
+  for (const auto& [id, pair] : pairs_) {
+    if (residual().facts().has_direction) {
+      latents.planes[id] = {graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+    }
+    for (const int64_t frame : pair.frame_times) {
+      latents.frame_times_s[frame] = graph_.value(FrameTimeBlock(frame))[0];
+    }
+  }
+  return latents;
+}
+
 Result<std::vector<FactorGraph::Functional>> PairGraph::StateFunctionals() const {
   const int num_effects = effects_ != nullptr ? effects_->size() : 0;
   std::vector<FactorGraph::Functional> functionals(static_cast<size_t>(kStateSize + num_effects));

@@ -81,7 +81,13 @@ void PairGraph::AddFrameTimes(const TimedPair& timed, Pair* pair) {
   for (const double stamp_s : {timed.time_a_s, timed.time_b_s}) {
     const int64_t number = FrameNumber(stamp_s);
     if (!graph_.Has(FrameTimeBlock(number))) {
-      graph_.AddBlock(FrameTimeBlock(number), {Geometry::kEuclidean, Eigen::VectorXd::Zero(1), {}});
+      double own_time_s = 0.0;
+      if (start_ != nullptr) {
+        const auto known = start_->frame_times_s.find(number);
+        if (known != start_->frame_times_s.end()) own_time_s = known->second;
+      }
+      graph_.AddBlock(FrameTimeBlock(number),
+                      {Geometry::kEuclidean, Eigen::VectorXd::Constant(1, own_time_s), {}});
       frame_time_priors_[number] = graph_.AddFactor(
           std::make_shared<FrameTimePrior>(frame_time_spread_s_), {FrameTimeBlock(number)});
     }

@@ -105,6 +105,10 @@ std::vector<FrameOffset> WidenedOffsets(const PairGraph& graph, double inflation
 // A tenth of a sigma. Robust weights and strong correlations (f and k1) make steps fall short.
 constexpr double kCostTolerance = 0.005;
 
+// Before the noise scale has settled, a solve is there for the scale, and the next one goes on. A
+// step that lowers the cost by less than this fraction changes it by half of that.
+constexpr double kRoughly = 1e-4;
+
 // Nobody needs a noise scale that is better known.
 bool SameScale(double before, double after) { return std::abs(after / before - 1.0) < 0.03; }
 
@@ -114,6 +118,7 @@ bool SameScale(double before, double after) { return std::abs(after / before - 1
 constexpr double kSettledStep = 0.1;
 // And of a round, with its new directions.
 constexpr double kSettledRound = 0.3;
+
 constexpr int kLeastPairs = 10;
 
 // How far two states are apart, with their effects, in sigmas: the Mahalanobis distance.
@@ -192,6 +197,7 @@ class Refinement {
       }
       if (result_.converged) break;
     }
+    result_.latents = std::make_shared<PairLatents>(graph_->Latents());
     return std::move(result_);
   }
 
@@ -200,7 +206,8 @@ class Refinement {
   Status Build() {
     graph_options_.sigma = scale_;
     built_at_ = result_.calibration;
-    graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_);
+    graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_,
+                                         result_.rounds == 1 ? options_.latents : nullptr);
     for (const TimedRate& rate : input_.rates) graph_->AddRate(rate);
     result_.skipped_pairs = 0;
     for (const TimedPair& pair : pairs_) {
@@ -221,7 +228,9 @@ class Refinement {
   void FindFirstScale() {
     const double searched_at = scale_;  // as the pairs were added
     SetScale(noise_.Next(AllResiduals(/*search=*/false), scale_));
-    if (facts_.of_attitudes || SameScale(searched_at, scale_)) return;
+    const bool same = SameScale(searched_at, scale_);
+    scale_settled_ = same && options_.latents != nullptr;
+    if (facts_.of_attitudes || same) return;
     SetScale(noise_.Next(AllResiduals(/*search=*/true), scale_));
   }
 
@@ -234,7 +243,10 @@ class Refinement {
   // hardly determine theirs creep along flat valleys, for dozens of steps that move nothing else.
   // Before, what is a sigma may still change a lot: with a lens that is far off, for example.
   SolveReport Solve() {
-    SolveOptions options{30, 1e-5, kCostTolerance};
+    SolveOptions options{30, kRoughly};
+    if (scale_settled_ || result_.rounds == options_.max_rounds) {
+      options = {30, 1e-5, kCostTolerance};
+    }
     yardstick_.reset();
     if (scale_settled_) {
       if (const auto covariance = graph_->NoiseCovariance()) yardstick_.emplace(*covariance);
@@ -308,7 +320,7 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
   constexpr int kMostTimes = 5;
   for (int i = 0; i < kMostTimes && RemakeEffects(recording, &fit.calibration); ++i) {
-    Result<Refined> better = refit(fit.calibration, fit.quality.noise_px);
+    Result<Refined> better = refit(fit);
     if (!better) break;
     const Calibration& c = better->calibration;
     const StateVector moved = Difference(c, fit.calibration).cwiseQuotient(c.sigma());

@@ -3,6 +3,7 @@
 #define CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,10 +15,14 @@
 
 namespace camgyro {
 
+struct PairLatents;
+
 struct RefinementOptions {
   PairGraphOptions graph;
   int max_rounds = 6;      // noise scale, directions and solve, until the estimate settles
   double cluster_s = 2.0;  // stretches of the clustered covariance
+  // Of a fit that has settled, whose result and noise this one starts from; null: of none.
+  std::shared_ptr<const PairLatents> latents;
 };
 
 struct FitQuality {
@@ -36,6 +41,7 @@ struct Refined {
   int skipped_pairs = 0;  // gyro gaps, too few matches, outside the gyro's time
   // With frame_stamp_jitter: of every frame that is in a pair, by PairGraph::FrameNumber.
   std::vector<FrameOffset> frame_times;
+  std::shared_ptr<const PairLatents> latents;
 };
 
 // Fits all `pairs` of the input. start: values with effects.
@@ -46,8 +52,8 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
 
 // A fit with those effects made anew that depend on the calibration, and refitted, until it stays
 // within a tenth of a sigma: what is left to gain by that would be taken for another effect's.
-// `refit`: from a start, with the noise so far [px or rad]; where it fails, the last fit stands.
-using Refit = std::function<Result<Refined>(const Calibration& start, double noise)>;
+// `refit`: from where a fit ended, but for its effects; where it fails, the last fit stands.
+using Refit = std::function<Result<Refined>(const Refined& from)>;
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit);
 
 // Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the

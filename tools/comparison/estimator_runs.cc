@@ -114,7 +114,10 @@ void RunRefinement(const Input& input, const EstimationInput& data, const PairGr
     options.graph.sigma = window_trace.back().noise_px;
   }
   const auto fit = [&](const std::vector<TimedPair>& pairs, const Refined* before) {
-    if (before != nullptr) options.graph.sigma = before->quality.noise_px;
+    if (before != nullptr) {
+      options.graph.sigma = before->quality.noise_px;
+      options.latents = before->latents;
+    }
     return Refine(data, pairs, before != nullptr ? before->calibration : from, input.prior,
                   options);
   };

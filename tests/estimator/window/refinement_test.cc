@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/rotation_chain.h"
+#include "estimator/window/pair_graph.h"
 #include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
@@ -101,6 +102,38 @@ TEST(Refinement, FramesHaveTimesOfTheirOwn) {
   ASSERT_TRUE(none.has_value()) << none.error().message;
   EXPECT_LT(none->calibration.effect_values[0], 0.3e-3);
   EXPECT_LT(ErrorInSigmas(none->calibration, clean.truth).cwiseAbs().maxCoeff(), 4.0);
+}
+
+// From where another fit of the same pairs ended, with its directions and its frames' own times,
+// one round finds the same again; with the calibration alone, frames' times have to be found anew.
+TEST(Refinement, GoesOnFromAnotherFit) {
+  Scenario scenario = ShortScenario(6.0);
+  scenario.effects.frame_stamp_jitter.spread_s = 2e-3;
+  const Simulated s = SimulateTracks(scenario).value();
+  const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  const Prior prior = StartOffTheTruth(s.truth);
+  Calibration start = prior.mean;
+  start.effects = std::make_shared<const EffectSet>(
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+  start.effect_values = Eigen::VectorXd::Zero(1);
+  const Result<Refined> fit = Refine(input, input.pairs, start, prior, {});
+  ASSERT_TRUE(fit.has_value()) << fit.error().message;
+  ASSERT_NE(fit->latents, nullptr);
+  EXPECT_EQ(static_cast<int>(fit->latents->planes.size()), fit->quality.pairs);
+  EXPECT_EQ(fit->latents->frame_times_s.size(), fit->frame_times.size());
+
+  RefinementOptions options;
+  options.graph.sigma = fit->quality.noise_px;
+  const Result<Refined> anew = Refine(input, input.pairs, fit->calibration, prior, options);
+  ASSERT_TRUE(anew.has_value()) << anew.error().message;
+  options.latents = fit->latents;
+  const Result<Refined> again = Refine(input, input.pairs, fit->calibration, prior, options);
+  ASSERT_TRUE(again.has_value()) << again.error().message;
+  EXPECT_TRUE(again->converged);
+  EXPECT_EQ(again->rounds, 1);
+  EXPECT_GT(anew->rounds, 1);
+  const StateVector moved = Difference(again->calibration, fit->calibration);
+  EXPECT_LT(moved.cwiseQuotient(fit->calibration.sigma()).cwiseAbs().maxCoeff(), 0.3);
 }
 
 // Motion blur: noise along the motion five times that across. Taken for alike in all directions,
