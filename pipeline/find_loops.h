@@ -27,6 +27,7 @@ struct LoopClosure {
   std::vector<FoundLoop> loops;
   int candidates = 0;                   // pairs of keyframes that looked alike
   std::vector<OdometryPose> keyframes;  // OdometryRun::keyframes with the loops closed
+  std::vector<OdometryPose> poses;      // OdometryRun::poses, likewise
   int Believed() const;
 };
 

@@ -165,8 +165,8 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
     files.Add("keyframes.csv", PosesCsv(run->keyframes));
     files.Add("points.ply", PointsPly(run->points));
     if (loops->Believed() > 0) {
-      files.Add("closed.tum", TrajectoryTum(loops->keyframes));
-      files.Add("closed.csv", PosesCsv(loops->keyframes));
+      files.Add("closed.tum", TrajectoryTum(loops->poses));
+      files.Add("closed.csv", PosesCsv(loops->poses));
     }
     const Command command = OdometryCommand();
     files.Add("report.html",

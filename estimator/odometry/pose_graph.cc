@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace camgyro {
@@ -114,6 +115,22 @@ class Graph {
   ceres::Problem problem_;
 };
 
+// A frame that is a keyframe: before, and as the keyframe is now.
+struct Anchor {
+  const OdometryPose* before;
+  const OdometryPose* now;
+};
+
+// As if the frame were fixed to the anchor.
+NavigationState MovedBy(const Anchor& anchor, NavigationState state) {
+  const NavigationState &before = anchor.before->state, &now = anchor.now->state;
+  const Eigen::Quaterniond turn = now.q_world_gyro * before.q_world_gyro.conjugate();
+  state.q_world_gyro = (turn * state.q_world_gyro).normalized();
+  state.p_world_m = now.p_world_m + turn * (state.p_world_m - before.p_world_m);
+  state.v_world_m_s = now.v_world_m_s + turn * (state.v_world_m_s - before.v_world_m_s);
+  return state;
+}
+
 OdometryPose MovedTo(const OdometryPose& from, const Vector4d& pose, const Matrix4d& covariance) {
   OdometryPose moved = from;
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(pose[3], Vector3d::UnitZ()));
@@ -186,6 +203,41 @@ Result<ClosedLoops> CloseLoops(const std::vector<OdometryPose>& keyframes,
     closed.keyframes[i] = MovedTo(keyframes[i], poses[i], widening * covariances[i]);
   }
   return closed;
+}
+
+std::vector<OdometryPose> MoveWithKeyframes(const std::vector<OdometryPose>& frames,
+                                            const std::vector<OdometryPose>& keyframes) {
+  std::map<int64_t, const OdometryPose*> keyframe_by_stamp;
+  for (const OdometryPose& keyframe : keyframes) {
+    keyframe_by_stamp[keyframe.frame_stamp_ns] = &keyframe;
+  }
+  std::map<int, std::map<int64_t, Anchor>> by_segment;  // by time
+  for (const OdometryPose& frame : frames) {
+    const auto keyframe = keyframe_by_stamp.find(frame.frame_stamp_ns);
+    if (keyframe == keyframe_by_stamp.end()) continue;
+    by_segment[frame.segment][frame.time_ns] = {&frame, keyframe->second};
+  }
+  std::vector<OdometryPose> moved = frames;
+  for (OdometryPose& frame : moved) {
+    const auto anchors = by_segment.find(frame.segment);
+    if (anchors == by_segment.end()) continue;
+    auto next = anchors->second.lower_bound(frame.time_ns);
+    if (next == anchors->second.end()) --next;
+    auto last = next;
+    if (last != anchors->second.begin() && frame.time_ns < next->first) --last;
+    const double share = next == last || frame.time_ns > next->first
+                             ? 1.0
+                             : static_cast<double>(frame.time_ns - last->first) /
+                                   static_cast<double>(next->first - last->first);
+    const NavigationState a = MovedBy(last->second, frame.state);
+    const NavigationState b = MovedBy(next->second, frame.state);
+    frame.state.q_world_gyro = a.q_world_gyro.slerp(share, b.q_world_gyro);
+    frame.state.p_world_m = (1.0 - share) * a.p_world_m + share * b.p_world_m;
+    frame.state.v_world_m_s = (1.0 - share) * a.v_world_m_s + share * b.v_world_m_s;
+    frame.covariance =
+        (1.0 - share) * last->second.now->covariance + share * next->second.now->covariance;
+  }
+  return moved;
 }
 
 }  // namespace camgyro

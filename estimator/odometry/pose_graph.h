@@ -48,6 +48,13 @@ RelativeYawPosition WayBetween(const OdometryPose& a, const OdometryPose& b);
 Result<ClosedLoops> CloseLoops(const std::vector<OdometryPose>& keyframes,
                                const std::vector<LoopEdge>& loops);
 
+// Poses of frames, as known at their time, moved as the keyframes among them have moved since: one
+// between two keyframes of its segment by shares of time, one before or after all of them as the
+// nearest. They get the covariance of these keyframes, by the same shares. Frames of a segment
+// without keyframes stay. All by time.
+std::vector<OdometryPose> MoveWithKeyframes(const std::vector<OdometryPose>& frames,
+                                            const std::vector<OdometryPose>& keyframes);
+
 }  // namespace camgyro
 
 #endif  // CAMGYRO_ESTIMATOR_ODOMETRY_POSE_GRAPH_H_

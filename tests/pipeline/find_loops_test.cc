@@ -98,6 +98,7 @@ TEST_F(FindLoopsTest, LoopsAreWhereTheTruthHasThem) {
     EXPECT_LT((q_older.conjugate() * turned).angularDistance(relative), 0.04);
   }
   EXPECT_EQ(closure->keyframes.size(), run_.keyframes.size());
+  EXPECT_EQ(closure->poses.size(), run_.poses.size());
 }
 
 TEST_F(FindLoopsTest, SameRecordingSameLoops) {

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -225,6 +226,48 @@ TEST(PoseGraph, SigmasAreWidenedWhereLoopsContradictThem) {
   }
   EXPECT_GT(factor, 2.0);
   EXPECT_LT(nees, 10.0);  // without the factor: of the order of 16
+}
+
+// Frames whose world is turned and shifted against that of the keyframes, the more the later, come
+// to lie where the truth is.
+TEST(MoveWithKeyframes, FramesFollowTheirKeyframes) {
+  Way way(7);
+  std::vector<OdometryPose> frames, keyframes;
+  for (size_t i = 0; i < way.truth.size(); ++i) {
+    OdometryPose& truth = way.truth[i];
+    truth.frame_stamp_ns = truth.time_ns - 20'000'000;
+    truth.covariance.setIdentity();
+    truth.covariance *= static_cast<double>(i);
+    OdometryPose frame = truth;
+    frame.covariance.setZero();
+    const Eigen::Quaterniond turn(
+        Eigen::AngleAxisd(1.0 + 1e-4 * static_cast<double>(i), Vector3d::UnitZ()));
+    frame.state.q_world_gyro = turn * truth.state.q_world_gyro;
+    frame.state.p_world_m = turn * truth.state.p_world_m + Vector3d(1.0, 2.0, 3.0);
+    frame.state.v_world_m_s = turn * truth.state.v_world_m_s;
+    frames.push_back(frame);
+    if (i >= 4 && i % 4 == 0) keyframes.push_back(truth);
+  }
+  OdometryPose elsewhere = frames.back();  // of a segment without keyframes
+  elsewhere.time_ns += 1'000'000'000;
+  elsewhere.frame_stamp_ns += 1'000'000'000;
+  elsewhere.segment = 1;
+  frames.push_back(elsewhere);
+
+  const std::vector<OdometryPose> moved = MoveWithKeyframes(frames, keyframes);
+  ASSERT_EQ(moved.size(), frames.size());
+  for (size_t i = 0; i < way.truth.size(); ++i) {
+    SCOPED_TRACE(i);
+    const NavigationState &state = moved[i].state, &truth = way.truth[i].state;
+    EXPECT_LT((state.p_world_m - truth.p_world_m).norm(), 2e-3);  // 4 keyframes of 1e-4 rad, 4 m
+    EXPECT_LT(state.q_world_gyro.angularDistance(truth.q_world_gyro), 5e-4);
+    EXPECT_LT((state.v_world_m_s - truth.v_world_m_s).norm(), 2e-3);
+    const double first = 4.0, last = static_cast<double>(keyframes.back().covariance(0, 0));
+    EXPECT_NEAR(moved[i].covariance(0, 0), std::clamp(static_cast<double>(i), first, last), 1e-9);
+    EXPECT_EQ(moved[i].time_ns, frames[i].time_ns);
+  }
+  EXPECT_EQ(moved[8].state.p_world_m, way.truth[8].state.p_world_m);  // itself a keyframe
+  EXPECT_EQ(moved.back().state.p_world_m, elsewhere.state.p_world_m);
 }
 
 TEST(PoseGraph, RefusesLoopsBetweenKeyframesThatAreNotThere) {
