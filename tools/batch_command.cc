@@ -28,6 +28,9 @@ DECLARE_string(out);
 DECLARE_int32(jobs);
 DECLARE_int32(threads);
 DECLARE_bool(quiet);
+DEFINE_string(only, "",
+              "a device of the manifest: works on its recordings alone, and writes nothing outside "
+              "of its folder, so that several machines may work on one --out");
 
 namespace camgyro {
 namespace {
@@ -50,7 +53,8 @@ std::string CommandOf(const BatchRecording& row) {
   Command calibrate = BatchCommand();
   calibrate.name = "calibrate";
   const auto of_batch = [](const std::string& name) {
-    return name == "out" || name == "jobs" || name == "threads" || name == "quiet";
+    return name == "out" || name == "only" || name == "jobs" || name == "threads" ||
+           name == "quiet";
   };
   calibrate.flags.erase(std::remove_if(calibrate.flags.begin(), calibrate.flags.end(), of_batch),
                         calibrate.flags.end());
@@ -152,6 +156,9 @@ Status CombineDevice(BatchDevice* device) {
   return {};
 }
 
+// Relative to --out.
+std::string TableOfRecordings() { return (fs::path(FLAGS_only) / "recordings.csv").string(); }
+
 Status WriteTables(const std::vector<BatchDevice>& devices) {
   FileSet files(FLAGS_out);
   for (const BatchDevice& device : devices) {
@@ -159,7 +166,7 @@ Status WriteTables(const std::vector<BatchDevice>& devices) {
     files.Add(device.name + "/device.html", batch::DevicePage(device));
     if (device.combined) files.Add(device.name + "/calibration.yaml", DeviceYaml(*device.combined));
   }
-  files.Add("recordings.csv", batch::RecordingsCsv(devices));
+  files.Add(TableOfRecordings(), batch::RecordingsCsv(devices));
   return files.Write();
 }
 
@@ -196,8 +203,8 @@ Status ExitOf(const std::vector<BatchDevice>& devices) {
   }
   if (failed == 0) return {};
   return tl::unexpected(
-      Error{kind, Format("%zu of %zu recordings failed; %s/recordings.csv says why", failed,
-                         recordings, FLAGS_out.c_str())});
+      Error{kind, Format("%zu of %zu recordings failed; %s/%s says why", failed, recordings,
+                         FLAGS_out.c_str(), TableOfRecordings().c_str())});
 }
 
 // Those of the workers, too: before all of them complain.
@@ -211,10 +218,20 @@ Status CheckFlags() {
   return {};
 }
 
+// Of the manifest, those that --only leaves.
+Result<std::vector<BatchRecording>> RowsOf(const std::string& manifest) {
+  Result<std::vector<BatchRecording>> rows = batch::ReadManifest(manifest);
+  if (!rows || FLAGS_only.empty()) return rows;
+  const auto of_another = [](const BatchRecording& row) { return row.device != FLAGS_only; };
+  rows->erase(std::remove_if(rows->begin(), rows->end(), of_another), rows->end());
+  if (rows->empty()) return BadUsage("--only: " + manifest + " has no device " + FLAGS_only);
+  return rows;
+}
+
 Status RunBatch(const std::vector<std::string>& arguments) {
   if (Status flags = CheckFlags(); !flags) return flags;
   if (Status writable = FileSet(FLAGS_out).CheckWritable(); !writable) return writable;
-  const Result<std::vector<BatchRecording>> rows = batch::ReadManifest(arguments[0]);
+  const Result<std::vector<BatchRecording>> rows = RowsOf(arguments[0]);
   if (!rows) return tl::unexpected(rows.error());
   const std::vector<std::string> crashes = RunMissing(*rows);
   std::vector<BatchDevice> devices;
@@ -229,10 +246,8 @@ Status RunBatch(const std::vector<std::string>& arguments) {
   if (Status written = WriteTables(devices); !written) return written;
   for (const BatchDevice& device : devices) PrintDevice(device);
   if (!FLAGS_quiet) {
-    std::printf(
-        "\nwritten    %s/recordings.csv; of each device device.csv, device.html, "
-        "calibration.yaml\n",
-        FLAGS_out.c_str());
+    std::printf("\nwritten    %s/%s; of each device device.csv, device.html, calibration.yaml\n",
+                FLAGS_out.c_str(), TableOfRecordings().c_str());
   }
   return ExitOf(devices);
 }
@@ -247,7 +262,7 @@ Command BatchCommand() {
       "many recordings, resumable, and a table per device: MANIFEST is a csv file with the columns "
       "device and recording; every recording gets a folder below --out, every device its "
       "calibration and how well its recordings repeat it; what is done is not done again";
-  command.flags = {"out", "jobs"};
+  command.flags = {"out", "only", "jobs"};
   for (const std::string& name : FitFlags()) command.flags.push_back(name);
   command.flags.push_back("device");
   for (const std::string& name : InputFlags()) command.flags.push_back(name);

@@ -102,6 +102,35 @@ TEST_F(BatchCommandTest, DoesWhatIsMissingOnly) {
               HasSubstr("0 of them done before"));
 }
 
+// Parts of the work, as machines share it out, make what one machine makes; the last run has only
+// the tables left to do.
+TEST_F(BatchCommandTest, DevicesOneByOneGiveTheSame) {
+  Record("a", 1);
+  Record("b", 2);
+  Record("c", 3);
+  Write("list.csv", "device,recording\nphone,a\nother,b\nphone,c\n");
+  ASSERT_EQ(Run("batch list.csv --out=whole --quiet").exit_code, 0);
+  for (const char* device : {"other", "phone"}) {
+    const RunResult run = Run(std::string("batch list.csv --out=out --only=") + device);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr(std::string("out/") + device + "/recordings.csv"));
+  }
+  EXPECT_FALSE(Exists("out/recordings.csv"));
+  EXPECT_THAT(ReadFile(Path("out/other/recordings.csv")),
+              AllOf(HasSubstr("other,b,other/b,0,"), Not(HasSubstr("phone"))));
+  EXPECT_THAT(Run("batch list.csv --out=out").out,
+              HasSubstr("3 recordings, 3 of them done before"));
+  for (const char* file : {"recordings.csv", "phone/device.csv", "phone/calibration.yaml",
+                           "other/device.csv", "other/b/calibration.yaml"}) {
+    EXPECT_EQ(ReadFile(Path(std::string("out/") + file)),
+              ReadFile(Path(std::string("whole/") + file)))
+        << file;
+  }
+  const RunResult none = Run("batch list.csv --out=out --only=tablet");
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("--only: list.csv has no device tablet"));
+}
+
 // Killed at any moment, everything that has an outcome is whole, and the next run goes on from it.
 TEST_F(BatchCommandTest, GoesOnAfterItWasKilled) {
   Record("a", 1);
