@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/time.h"
 #include "simulation/gyro.h"
@@ -294,14 +295,27 @@ Result<Simulated> SimulateSensors(const Scenario& scenario) {
   return result;
 }
 
+void ForEachFrame(const Scenario& scenario, const Simulated& sensors,
+                  const std::function<void(size_t, std::vector<TrackedPoint>*,
+                                           std::vector<PointTruth>*)>& visit) {
+  Tracker tracker(scenario, *sensors.camera, sensors.scene);
+  for (size_t i = 0; i < sensors.frames.size(); ++i) {
+    std::vector<TrackedPoint> tracks;
+    std::vector<PointTruth> truths;
+    tracker.Step(sensors.frames[i].timing, &tracks, &truths);
+    visit(i, &tracks, &truths);
+  }
+}
+
 Result<Simulated> SimulateTracks(const Scenario& scenario) {
   Result<Simulated> result = SimulateSensors(scenario);
   if (!result) return result;
-  Tracker tracker(scenario, *result->camera, result->scene);
-  for (const FrameTruth& frame : result->frames) {
-    tracker.Step(frame.timing, &result->recording.tracks.emplace_back(),
-                 &result->points.emplace_back());
-  }
+  ForEachFrame(
+      scenario, *result,
+      [&](size_t /*frame*/, std::vector<TrackedPoint>* tracks, std::vector<PointTruth>* truths) {
+        result->recording.tracks.push_back(std::move(*tracks));
+        result->points.push_back(std::move(*truths));
+      });
   if (scenario.tracks.reanchored) result->recording.match_noise = MatchNoise::kSecondImage;
   return result;
 }

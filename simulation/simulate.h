@@ -3,7 +3,9 @@
 #define CAMGYRO_SIMULATION_SIMULATE_H_
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -48,7 +50,13 @@ struct Simulated {
 // Frames, gyro, accelerometer and the resolution; no image motion.
 Result<Simulated> SimulateSensors(const Scenario& scenario);
 
-// The same with tracks. Re-anchored tracks set MatchNoise::kSecondImage.
+// The tracks of the frames of SimulateSensors, in turn, without keeping any: for streams of hours.
+// visit(frame, tracks, what is true of them) may move them.
+void ForEachFrame(
+    const Scenario& scenario, const Simulated& sensors,
+    const std::function<void(size_t, std::vector<TrackedPoint>*, std::vector<PointTruth>*)>& visit);
+
+// The sensors with tracks. Re-anchored tracks set MatchNoise::kSecondImage.
 // Errors: the trajectory file; a camera that leaves the room.
 Result<Simulated> SimulateTracks(const Scenario& scenario);
 
