@@ -23,6 +23,9 @@ constexpr size_t kMaxWaiting = 300;    // frames whose gyro samples have not com
 constexpr double kGyroMarginS = 0.06;  // of samples beyond a pair, so that the delay can move
 constexpr double kSteadyS = 2.0;
 constexpr double kStaleS = 5.0;  // frames without a solved window
+// Clocks of cameras that warm up change their rate by some 1 ppm in a second, those of flight
+// controllers, whose delay grows by 20 to 30 ms in a minute, by some 10 ppm.
+constexpr double kSkewWalk_rtHz = 20e-6;
 
 }  // namespace
 
@@ -106,11 +109,12 @@ Status OnlineCalibration::TryStart() {
   gap_ = SelectPairs(recording, /*longest_gap=*/10, /*least_pairs=*/10).gap;
 
   const Result<StartingPoint> point =
-      MakeStartingPoint(recording, *start, /*effects=*/"", ByPlane());
+      MakeStartingPoint(recording, *start, /*effects=*/"clock_skew", ByPlane());
   if (!point) return tl::unexpected(point.error());
   progress_.prior_sigma = point->prior.sigma;
   SlidingWindowOptions window_options;
   window_options.graph = GraphOptionsFor(recording, *start, {});
+  window_options.skew_walk_rtHz = kSkewWalk_rtHz;
   window_.emplace(point->estimate, point->prior, gyro_.front().stamp_ns, window_options);
   window_->SetListener([this](const WindowUpdate& update) { Remember(update); });
   history_.clear();
@@ -169,6 +173,7 @@ void OnlineCalibration::Remember(const WindowUpdate& update) {
   progress_.estimate = update.estimate;
   progress_.frame_stamp_ns = update.frame_stamp_ns;
   progress_.noise_px = update.noise_px;
+  progress_.clock_skew = update.clock_skew;
   history_.emplace_back(update.frame_stamp_ns, update.estimate);
   while (history_.size() > 2 &&
          SecondsSince(history_[1].first, update.frame_stamp_ns) >= kSteadyS) {

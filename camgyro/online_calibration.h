@@ -32,6 +32,7 @@ class OnlineCalibration {
     StateVector prior_sigma = StateVector::Zero();
     int64_t frame_stamp_ns = 0;
     double noise_px = 0.0;
+    double clock_skew = 0.0;  // how fast the delay grows at that frame
     // Largest change of each parameter within the last two seconds of the camera; infinite before.
     StateVector movement = StateVector::Constant(std::numeric_limits<double>::infinity());
     uint64_t frames = 0, pairs_used = 0, pairs_skipped = 0;

@@ -1,10 +1,13 @@
 #include "camgyro/total_error.h"
 
 #include <cmath>
+#include <limits>
 
 #include "core/time.h"
 #include "estimator/calibrate.h"
 #include "estimator/diagnosis/model_check.h"
+#include "estimator/starting_point.h"
+#include "estimator/window/estimation_input.h"
 
 namespace camgyro::api {
 
@@ -26,9 +29,22 @@ void TotalError::Renew(const VinsInput& latest, MatchNoise noise,
   recording.accel = latest.accel;
   if (recording.frames.size() < 2 || recording.gyro.size() < 2) return;
 
+  // The clocks' rates are in the model. Here the delay is that of the first sample.
   CalibrationReport report;
-  report.calibration = *progress.estimate;
-  report.prior = {*progress.estimate, progress.prior_sigma};
+  camgyro::Calibration& calibration = report.calibration;
+  calibration = *progress.estimate;
+  calibration.effects = nullptr;
+  report.start.clock_skew = progress.clock_skew;
+  const Status added =
+      AddStartEffects(recording, report.start, "clock_skew", ByPlane(), &calibration);
+  if (!added) return;
+  const FrameTime latest_frame{
+      SecondsSince(recording.gyro.front().stamp_ns, progress.frame_stamp_ns),
+      std::numeric_limits<double>::quiet_NaN()};
+  calibration.delay_s += progress.estimate->delay_s - DelayOf(calibration, latest_frame);
+  calibration.effect_covariance =
+      Eigen::MatrixXd::Zero(calibration.effect_values.size(), calibration.effect_values.size());
+  report.prior = {calibration, progress.prior_sigma};
   report.start.delay_middle_row_s = report.calibration.delay_s + 0.5 * report.calibration.readout_s;
   report.quality.noise_px = progress.noise_px;
   doubt_ = CheckModel(recording, {}, device_, &report).value_or("");

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "estimator/window/marginalize.h"
 #include "estimator/window/normal_equations.h"
@@ -42,6 +43,25 @@ tl::unexpected<Error> NoValue() {
 bool IsConstant(const Block& block, int coordinate) {
   return std::find(block.constant.begin(), block.constant.end(), coordinate) !=
          block.constant.end();
+}
+
+// Puts the step of a walk in front of the unknowns, and its prior below the rows. What was of the
+// state before the step, x - direction * step, is then of the state x after it, and of the step.
+void AddWalk(const FactorGraph::Walk& walk, const std::map<BlockId, Eigen::Index>& columns,
+             Eigen::MatrixXd* J, Eigen::VectorXd* residuals) {
+  CHECK_GT(walk.sigma, 0.0);
+  const Eigen::Index rows = J->rows(), size = J->cols();
+  Eigen::MatrixXd with = Eigen::MatrixXd::Zero(rows + 1, size + 1);
+  with.block(0, 1, rows, size) = *J;
+  for (const FactorGraph::FunctionalTerm& term : walk.direction) {
+    const auto column = columns.find(term.block);
+    if (column == columns.end()) continue;  // nothing that leaves knows it
+    with.col(0).head(rows) -= term.weight * J->col(column->second + term.coordinate);
+  }
+  with(rows, 0) = 1.0 / walk.sigma;
+  *J = std::move(with);
+  residuals->conservativeResize(rows + 1);
+  (*residuals)[rows] = 0.0;
 }
 
 }  // namespace
@@ -213,7 +233,8 @@ Result<Linearization> FactorGraph::Linearize(const std::vector<FactorKey>& keys)
 }
 
 Result<int> FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
-                                     const std::vector<FactorKey>& also) {
+                                     const std::vector<FactorKey>& also,
+                                     const std::optional<Walk>& walk) {
   const std::set<BlockId> leaving_set(leaving.begin(), leaving.end());
   std::vector<FactorKey> touched;
   for (const auto& [key, factor] : factors_) {
@@ -232,6 +253,7 @@ Result<int> FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
     // zero for the constant ones, since the prior knows nothing of subsets.
     std::vector<Eigen::Index> order;
     std::vector<BlockId> staying;
+    std::map<BlockId, Eigen::Index> columns;  // of what stays
     for (const bool leaves : {true, false}) {
       for (size_t i = 0; i < linear.blocks.size(); ++i) {
         if ((leaving_set.count(linear.blocks[i]) > 0) != leaves) continue;
@@ -242,6 +264,7 @@ Result<int> FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
         }
         CHECK(block.geometry != Geometry::kDirection) << "a direction leaves with its pair";
         staying.push_back(linear.blocks[i]);
+        columns[linear.blocks[i]] = static_cast<Eigen::Index>(order.size());
         int column = linear.offsets[i];
         const int size =
             block.geometry == Geometry::kRotation ? 3 : static_cast<int>(block.value.size());
@@ -261,7 +284,12 @@ Result<int> FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
     for (size_t c = 0; c < order.size(); ++c) {
       if (order[c] >= 0) J.col(static_cast<Eigen::Index>(c)) = linear.J.col(order[c]);
     }
-    Elimination elimination = EliminateLeading(J, linear.residuals, num_leaving);
+    Eigen::VectorXd residuals = linear.residuals;
+    if (walk) {
+      AddWalk(*walk, columns, &J, &residuals);
+      ++num_leaving;
+    }
+    Elimination elimination = EliminateLeading(J, residuals, num_leaving);
     undetermined = elimination.undetermined;
     if (!staying.empty() && elimination.offset.size() > 0) {
       std::vector<MarginalPrior::Block> prior_blocks;

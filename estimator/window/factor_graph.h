@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -83,6 +84,9 @@ struct SolveOptions {
   // Or as soon as this is true, if it is given: asked after each step that lowers the cost, with
   // the values of that step in the graph.
   std::function<bool()> settled = nullptr;
+  // Of the first step; Ceres' own. Where columns nearly depend on each other, and are determined
+  // all the same, its damping would hold what tells them apart.
+  double trust_region_radius = 1e4;
 };
 
 struct SolveReport {
@@ -156,12 +160,19 @@ class FactorGraph {
   // kCannotEstimate where one has no value.
   Result<Linearization> Linearize(const std::vector<FactorKey>& keys) const;
 
+  // A random walk: what stays has moved by N(0, sigma^2) along a direction of Euclidean blocks
+  // since the factors that leave were true.
+  struct Walk {
+    Functional direction;
+    double sigma = 0.0;  // > 0
+  };
   // Removes `leaving` and every factor that touches them, and the factors `also`, and adds a
-  // MarginalPrior that says the same about the neighbours. Returns the number of directions of
-  // `leaving` that no factor determined (0 in a sound window). No neighbours: nothing is added.
-  // Errors: those of Linearize; then nothing has changed.
+  // MarginalPrior that says the same about the neighbours, after their walk if there is one.
+  // Returns the number of directions of `leaving` that no factor determined (0 in a sound window).
+  // No neighbours: nothing is added. Errors: those of Linearize; then nothing has changed.
   Result<int> Marginalize(const std::vector<BlockId>& leaving,
-                          const std::vector<FactorKey>& also = {});
+                          const std::vector<FactorKey>& also = {},
+                          const std::optional<Walk>& walk = std::nullopt);
 
  private:
   std::vector<const Factor*> AllFactors() const;

@@ -34,6 +34,9 @@ ceres::Solver::Options CeresOptions(const SolveOptions& options) {
   ceres_options.num_threads = 1;
   ceres_options.max_num_iterations = options.max_iterations;
   ceres_options.function_tolerance = options.function_tolerance;
+  ceres_options.initial_trust_region_radius = options.trust_region_radius;
+  ceres_options.max_trust_region_radius =
+      std::max(ceres_options.max_trust_region_radius, options.trust_region_radius);
   ceres_options.gradient_tolerance = 0.0;
   ceres_options.parameter_tolerance = 0.0;
   // As fast as any for the window, and near the fastest for the refinement

@@ -3,6 +3,7 @@
 #include <glog/logging.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <set>
@@ -69,11 +70,12 @@ void PairGraph::AddStatePrior(const Prior& prior) {
   ShutterParameters shutter_sigma;
   shutter_sigma[kDelay] = sigma[kStateDelay];
   shutter_sigma[kReadout] = sigma[kStateReadout];
-  graph_.AddFactor(std::make_shared<GaussianPrior>(std::vector<GaussianPrior::Block>{
-                       {prior.mean.lens, lens_sigma, false},
-                       {ShutterOf(prior.mean), shutter_sigma, false},
-                       {prior.mean.q_gyro_cam.coeffs(), sigma.segment<3>(kStateRotation), true}}),
-                   {kLensBlock, kShutterBlock, kRotationBlock});
+  state_prior_ = graph_.AddFactor(
+      std::make_shared<GaussianPrior>(std::vector<GaussianPrior::Block>{
+          {prior.mean.lens, lens_sigma, false},
+          {ShutterOf(prior.mean), shutter_sigma, false},
+          {prior.mean.q_gyro_cam.coeffs(), sigma.segment<3>(kStateRotation), true}}),
+      {kLensBlock, kShutterBlock, kRotationBlock});
 }
 
 void PairGraph::AddEffectsPrior() {
@@ -249,7 +251,28 @@ std::vector<BlockId> PairGraph::BlocksOf(int64_t id, const Pair& pair) const {
 
 SolveReport PairGraph::Solve(const SolveOptions& options) { return graph_.Solve(options); }
 
-Status PairGraph::MarginalizeOldest() {
+int PairGraph::skew_column() const {
+  if (effects_ == nullptr) return -1;
+  for (const EffectSet::Item& item : effects_->items()) {
+    if (item.entry->name == "clock_skew") return item.first;
+  }
+  return -1;
+}
+
+std::optional<FactorGraph::Walk> PairGraph::SkewWalk(double skew_walk_rtHz) const {
+  if (!(skew_walk_rtHz > 0.0) || pairs_.size() < 2) return std::nullopt;
+  const int column = skew_column();
+  if (column < 0) return std::nullopt;
+  const Pair &oldest = pairs_.begin()->second, &next = std::next(pairs_.begin())->second;
+  // The delay of the next pair is what it is: only the rate has changed until then.
+  const Eigen::VectorXd by_effects = DelayByEffects(next.measurement->frame_a);
+  FactorGraph::Walk walk;
+  walk.direction = {{kEffectsBlock, column, 1.0}, {kShutterBlock, kDelay, -by_effects[column]}};
+  walk.sigma = 1e6 * skew_walk_rtHz * std::sqrt(std::max(1e-3, next.time_s - oldest.time_s));
+  return walk;
+}
+
+Status PairGraph::MarginalizeOldest(double skew_walk_rtHz) {
   CHECK(!pairs_.empty());
   const auto oldest = pairs_.begin();
   std::set<int64_t> groups_needed, frames_needed;
@@ -272,7 +295,14 @@ Status PairGraph::MarginalizeOldest() {
   }
   for (const BlockId& bias : rates_.BiasesOnlyOf(groups, graph_)) leaving.push_back(bias);
   // The pair's own factor leaves even where no block of it does (determinants have no direction).
-  if (const Result<int> done = graph_.Marginalize(leaving, {oldest->second.factor}); !done) {
+  std::vector<FactorGraph::FactorKey> also = {oldest->second.factor};
+  const std::optional<FactorGraph::Walk> walk = SkewWalk(skew_walk_rtHz);
+  if (walk) {
+    also.push_back(state_prior_);
+    // That of frames with times of their own is made anew with their spread.
+    if (!has_frame_times()) also.push_back(effects_prior_);
+  }
+  if (const Result<int> done = graph_.Marginalize(leaving, also, walk); !done) {
     return tl::unexpected(done.error());
   }
   rates_.Drop(groups);

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -75,8 +76,11 @@ class PairGraph {
   SolveReport Solve(const SolveOptions& options);
 
   // Marginalises the oldest pair with its direction and the rates and biases that only it needs.
-  // Errors: those of FactorGraph::Marginalize; then nothing has changed.
-  Status MarginalizeOldest();
+  // skew_walk_rtHz: the clocks' rates walk (effect clock_skew): by that in a second [1/sqrt(s)],
+  // from the oldest pair to the next. What was likely before is then marginalised, too, so that it
+  // is forgotten with the rest. Errors: those of FactorGraph::Marginalize; then nothing has
+  // changed.
+  Status MarginalizeOldest(double skew_walk_rtHz = 0.0);
   // Drops the samples before a time on the gyro clock that no pair in the graph needs.
   void ForgetOldRates(double before_s) { rates_.Forget(before_s); }
 
@@ -98,6 +102,9 @@ class PairGraph {
   void SetSigma(int64_t id, double sigma);
   PairGraphOptions* options() { return &options_; }
 
+  // Column of effect clock_skew among the effects' values; -1: it is not in the model.
+  int skew_column() const;
+
   // Whether frames have times of their own here (frame_stamp_jitter).
   bool has_frame_times() const { return frame_time_spread_s_ != nullptr; }
   // What each pair says of them at the present estimate of everything else; frames are named by
@@ -116,7 +123,9 @@ class PairGraph {
   Calibration Estimate() const;
   // `inflation` (>= 1): of the graph's covariance, before that.
   // Errors: those of FactorGraph::Covariance, and kCannotEstimate without pairs.
-  Status EstimateCovariance(double cluster_s, double inflation, Calibration* calibration) const;
+  // `at`: the delay is that of a frame, as DelayOf has it, instead of the parameter.
+  Status EstimateCovariance(double cluster_s, double inflation, Calibration* calibration,
+                            const std::optional<FrameTime>& at = std::nullopt) const;
 
   // Of state and effects, in this order, as the factors alone have it: not widened. Errors: those
   // of EstimateCovariance.
@@ -160,7 +169,12 @@ class PairGraph {
   PairParameters ParametersOf(int64_t id, const Pair& pair) const;
   PairTimes FrameTimesOf(const Pair& pair) const;
   // State and effects as functionals of the blocks. Errors: kCannotEstimate without pairs.
-  Result<std::vector<FactorGraph::Functional>> StateFunctionals() const;
+  Result<std::vector<FactorGraph::Functional>> StateFunctionals(
+      const std::optional<FrameTime>& at = std::nullopt) const;
+  // Derivatives of a frame's delay by the effects [s].
+  Eigen::VectorXd DelayByEffects(const FrameTime& frame) const;
+  // Of the clocks' rates since the oldest pair, if they are in the model.
+  std::optional<FactorGraph::Walk> SkewWalk(double skew_walk_rtHz) const;
   // Beyond the exposures of a pair [s].
   double RateMargin() const;
 
@@ -171,7 +185,7 @@ class PairGraph {
   FactorGraph graph_;
   RateGroups rates_;
   double turn_sigma_rad_s_ = 0.0;  // of the options or, if wider, of the effects
-  FactorGraph::FactorKey effects_prior_ = 0;
+  FactorGraph::FactorKey state_prior_ = 0, effects_prior_ = 0;
   // Null: frames have no times of their own. Shared with their priors.
   std::shared_ptr<double> frame_time_spread_s_;
   double frame_time_spread_sigma_s_ = 0.0;

@@ -126,7 +126,15 @@ PairLatents PairGraph::Latents() const {
   return latents;
 }
 
-Result<std::vector<FactorGraph::Functional>> PairGraph::StateFunctionals() const {
+Eigen::VectorXd PairGraph::DelayByEffects(const FrameTime& frame) const {
+  const Eigen::Vector2d size_px(prior_mean_.width_px, prior_mean_.height_px);
+  EffectSet::Change change;
+  effects_->ChangeObservation({0.5 * size_px, size_px, frame}, &change);
+  return change.time.row(0);
+}
+
+Result<std::vector<FactorGraph::Functional>> PairGraph::StateFunctionals(
+    const std::optional<FrameTime>& at) const {
   const int num_effects = effects_ != nullptr ? effects_->size() : 0;
   std::vector<FactorGraph::Functional> functionals(static_cast<size_t>(kStateSize + num_effects));
   functionals[kStateFocal] = {{kLensBlock, 0}};
@@ -134,6 +142,12 @@ Result<std::vector<FactorGraph::Functional>> PairGraph::StateFunctionals() const
   functionals[kStateCy] = {{kLensBlock, 2}};
   functionals[kStateReadout] = {{kShutterBlock, kReadout}};
   functionals[kStateDelay] = {{kShutterBlock, kDelay}};
+  if (at && num_effects > 0) {
+    const Eigen::VectorXd by_effects = DelayByEffects(*at);
+    for (int i = 0; i < num_effects; ++i) {
+      functionals[kStateDelay].push_back({kEffectsBlock, i, by_effects[i]});
+    }
+  }
   std::vector<BlockId> biases;
   for (const auto& [id, block] : graph_.blocks()) {
     if (id.kind == BlockKind::kBias) biases.push_back(id);
@@ -159,9 +173,9 @@ Result<Eigen::MatrixXd> PairGraph::NoiseCovariance() const {
   return std::move(found->covariance);
 }
 
-Status PairGraph::EstimateCovariance(double cluster_s, double inflation,
-                                     Calibration* calibration) const {
-  const auto functionals = StateFunctionals();
+Status PairGraph::EstimateCovariance(double cluster_s, double inflation, Calibration* calibration,
+                                     const std::optional<FrameTime>& at) const {
+  const auto functionals = StateFunctionals(at);
   if (!functionals) return tl::unexpected(functionals.error());
   const auto size = static_cast<Eigen::Index>(functionals->size());
   const Eigen::Index num_effects = size - kStateSize;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/time.h"
@@ -79,21 +80,24 @@ void SlidingWindow::Process(const Pending& pair) {
     graph_.AllResiduals(/*search=*/true);
     UpdateNoise();
   }
-  Calibration estimate;
-  if (const Status solved = SolveWindow(&estimate); !solved) {
+  WindowUpdate update;
+  if (const Status solved = SolveWindow(pair.pair, &update); !solved) {
     ++num_failed_solves_;
     failure_ = solved.error().message;
     return;
   }
   failure_.clear();
-  settled_ = settled_ || Settled(estimate);
-  latest_ = {pair.stamp_b_ns, estimate, noise_px_, settled_};
+  settled_ = settled_ || Settled(update.estimate);
+  update.frame_stamp_ns = pair.stamp_b_ns;
+  update.noise_px = noise_px_;
+  update.settled = settled_;
+  latest_ = std::move(update);
   if (listener_) listener_(latest_);
 
   const int keep =
       settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.unsettled_stride;
   while (graph_.num_pairs() > keep) {
-    if (const Status left = graph_.MarginalizeOldest(); !left) {
+    if (const Status left = graph_.MarginalizeOldest(options_.skew_walk_rtHz); !left) {
       ++num_failed_solves_;
       failure_ = left.error().message;
       return;  // the next window tries again
@@ -101,15 +105,34 @@ void SlidingWindow::Process(const Pending& pair) {
   }
 }
 
-Status SlidingWindow::SolveWindow(Calibration* estimate) {
-  const SolveReport report = graph_.Solve({settled_ ? 4 : 10, 1e-4});
+int SlidingWindow::WalkingSkew() const {
+  return options_.skew_walk_rtHz > 0.0 ? graph_.skew_column() : -1;
+}
+
+Status SlidingWindow::SolveWindow(const TimedPair& newest, WindowUpdate* update) {
+  const int skew = WalkingSkew();
+  SolveOptions solve;
+  solve.max_iterations = settled_ ? 4 : 10;
+  solve.function_tolerance = 1e-4;
+  // Hours after the origin, the delay there and the skew are told apart by seconds.
+  if (skew >= 0 && settled_) solve.trust_region_radius = 1e14;
+  const SolveReport report = graph_.Solve(solve);
   if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
   UpdateNoise();
+  Calibration* const estimate = &update->estimate;
   *estimate = graph_.Estimate();
   // Of the last 100 pairs or so.
   cross_fit_ = cross_fit_ * 0.99;
   cross_fit_ += graph_.CrossFitOf(graph_.pair_ids().back());
-  return graph_.EstimateCovariance(/*cluster_s=*/2.0, cross_fit_.inflation(), estimate);
+  const std::optional<FrameTime> at =
+      skew >= 0 ? std::optional<FrameTime>(newest.second()) : std::nullopt;
+  const Status covariance =
+      graph_.EstimateCovariance(/*cluster_s=*/2.0, cross_fit_.inflation(), estimate, at);
+  if (!covariance || skew < 0) return covariance;
+  estimate->delay_s = DelayOf(*estimate, newest.second());
+  update->clock_skew = 1e-6 * estimate->effect_values[skew];
+  estimate->effect_values[skew] = 0.0;
+  return {};
 }
 
 void SlidingWindow::UpdateNoise() {

@@ -31,6 +31,10 @@ struct SlidingWindowOptions {
   double settled_readout_s = 1e-3;
   double settled_delay_s = 0.5e-3;
   double settled_rotation_rad = 5e-3;
+
+  // The rates of the clocks walk by that in a second [1/sqrt(s)], if effect clock_skew is in the
+  // model: the delay is then that of the newest frame. 0: nothing is forgotten.
+  double skew_walk_rtHz = 0.0;
 };
 
 enum class AddResult {
@@ -45,6 +49,9 @@ struct WindowUpdate {
   Calibration estimate;        // with covariance
   double noise_px = 0.0;
   bool settled = false;
+  // Of clocks whose rates walk: how fast the delay grows. The estimate's delay is that of the
+  // frame, and its effect is at zero.
+  double clock_skew = 0.0;
 };
 
 class SlidingWindow {
@@ -87,8 +94,10 @@ class SlidingWindow {
 
   void ProcessPending();
   void Process(const Pending& pair);
-  // Errors: kCannotEstimate.
-  Status SolveWindow(Calibration* estimate);
+  // Column of the skew among the effects; -1: the clocks' rates do not walk.
+  int WalkingSkew() const;
+  // Fills estimate and skew. Errors: kCannotEstimate.
+  Status SolveWindow(const TimedPair& newest, WindowUpdate* update);
   void UpdateNoise();
   void UpdateFrameTimes();
   bool Settled(const Calibration& estimate) const;

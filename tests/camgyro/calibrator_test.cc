@@ -108,6 +108,37 @@ TEST(Calibrator, LaysArrivalTimesOnTheirClock) {
   EXPECT_NEAR(snapshot->calibration.delay_s, s.truth.delay_s + std::log(2.0) * 2e-3, 0.4e-3);
 }
 
+// The delay of a flight controller's stamps, which grows by 20 to 30 ms in a minute.
+TEST(Calibrator, FollowsADelayThatDrifts) {
+  Scenario scenario = LivelyScenario(25.0);
+  scenario.effects.clock_skew.ppm = 417.0;
+  scenario.effects.delay_wander.amplitude_s = 0.67e-3;
+  scenario.effects.delay_wander.period_s = 60.0;
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const Recording& r = s.recording;
+  const auto calibrator = Make(OptionsFor(scenario));
+  size_t gyro = 0;
+  int estimates = 0, outside_two_sigmas = 0;
+  for (size_t i = 0; i < r.frames.size(); ++i) {
+    ASSERT_EQ(Add(calibrator.get(), r, i), AddResult::kAccepted);
+    const int64_t exposed_ns = StampAt(r.frames[i].stamp_ns, s.frames[i].delay_s + 0.02);
+    for (; gyro < r.gyro.size() && r.gyro[gyro].stamp_ns <= exposed_ns; ++gyro) {
+      ASSERT_EQ(Add(calibrator.get(), r.gyro[gyro]), AddResult::kAccepted);
+    }
+    ASSERT_TRUE(calibrator->WaitUntilIdle(60.0));
+    const auto snapshot = calibrator->snapshot();
+    if (!snapshot->has_estimate || i < 450) continue;  // it needs some seconds for its start
+    ++estimates;
+    const double error_s = std::abs(snapshot->calibration.delay_s - s.frames[i].delay_s);
+    EXPECT_LT(error_s, 0.5e-3) << i;
+    outside_two_sigmas += error_s > 2.0 * snapshot->parameters[kDelay].sigma;
+  }
+  EXPECT_EQ(estimates, 301);
+  // Neighbours share their errors: a twentieth in the long run.
+  EXPECT_LT(outside_two_sigmas, estimates / 4);
+  EXPECT_EQ(calibrator->snapshot()->starts, 1);
+}
+
 TEST(Calibrator, WrongAskedPrecisionIsNotReady) {
   const Scenario scenario = LivelyScenario(7.0);
   const Simulated s = simulation::SimulateTracks(scenario).value();

@@ -164,6 +164,28 @@ TEST(FactorGraph, WindowOfALinearProblemEqualsTheBatch) {
             1e-9 * expected.diagonal().maxCoeff());
 }
 
+// As a Kalman filter predicts: the mean stays, and the covariance grows by the step's.
+TEST(FactorGraph, WhatStaysMayHaveWalkedSince) {
+  FactorGraph graph;
+  graph.AddBlock(Shutter(), Euclidean(Eigen::Vector2d(1.0, -2.0)));
+  graph.AddFactor(RandomNumbers(1).Factor(2, {2}), {Shutter()});
+  AddLinearStep(0, &graph);
+  AddLinearStep(1, &graph);
+  SolveLinear(&graph);
+  const VectorXd mean = graph.value(Shutter());
+  const MatrixXd before = CovarianceOf(graph, {Shutter()});
+  const FactorGraph::Walk walk{{{Shutter(), 0, 2.0}, {Shutter(), 1, -0.5}}, 0.3};
+  const std::vector<BlockId> leaving = {Rates(0), Rates(1), Bias(0), Bias(1)};
+  EXPECT_EQ(graph.Marginalize(leaving, AllKeys(graph), walk).value(), 0);
+  graph.value(Shutter()) += Eigen::Vector2d(0.7, 0.4);
+  SolveLinear(&graph);
+  EXPECT_LT((graph.value(Shutter()) - mean).norm(), 1e-9);
+  const Eigen::Vector2d direction(2.0, -0.5);
+  const MatrixXd expected = before + 0.3 * 0.3 * direction * direction.transpose();
+  EXPECT_LT((CovarianceOf(graph, {Shutter()}) - expected).cwiseAbs().maxCoeff(),
+            1e-9 * expected.diagonal().maxCoeff());
+}
+
 TEST(FactorGraph, CovarianceOfFunctionalsIsTheInverseOfTheDenseInformation) {
   FactorGraph graph;
   graph.AddBlock(Shutter(), Euclidean(Eigen::Vector2d(1.0, -2.0)));
