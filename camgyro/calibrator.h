@@ -35,6 +35,7 @@ struct CalibratorOptions {
   double ready_rotation_rad = 10e-3;
   // Stamps of the gyro that are times of arrival are replaced by the sampling clock behind them,
   // with kAuto; samples then reach the estimate half a second later. The accelerometer's stay.
+  // Frames whose stamps are times of arrival are given times of their own, found with the rest.
   Stamps stamps = Stamps::kAuto;
   // Sizes of undeclared effects, for the total sigmas.
   Device device = Device::kPhone;
@@ -71,12 +72,18 @@ struct Snapshot {
   Stage stage = Stage::kCollecting;
   std::string message;      // for people
   std::string gyro_stamps;  // what they are, for people; empty before two seconds, or kRecorded
+  // The same of the frames' stamps; empty before the first search for a start.
+  std::string frame_stamps;
   std::string doubt;  // for people: the pictures show an effect that the model lacks; or empty
   Calibration calibration;  // meaningful once `has_estimate`
   bool has_estimate = false;
   std::array<ParameterState, kParameters> parameters{};
-  bool ready = false;                // all of them
-  std::int64_t frame_stamp_ns = 0;   // the latest frame in the estimate
+  bool ready = false;               // all of them
+  std::int64_t frame_stamp_ns = 0;  // the latest frame in the estimate
+  // Where frames' stamps are times of arrival (kAuto), each frame has a time of its own: by how
+  // much later that frame was taken than its stamp and calibration.delay_s say, with its sigma; and
+  // the standard deviation of that over the frames. Else 0.
+  double frame_offset_s = 0.0, frame_offset_sigma_s = 0.0, frame_jitter_s = 0.0;
   double noise_px = 0.0;             // of a match, per axis
   std::uint64_t frames = 0;          // processed by the worker
   std::uint64_t frames_dropped = 0;  // answered with kQueueFull

@@ -7,6 +7,7 @@
 #include "core/time.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/window/estimation_input.h"
+#include "frontend/stamp_clock.h"
 #include "frontend/track_cleaner.h"
 #include "pipeline/run.h"
 
@@ -30,8 +31,13 @@ constexpr double kSkewWalk_rtHz = 20e-6;
 }  // namespace
 
 OnlineCalibration::OnlineCalibration(const CameraGuess& camera, MatchNoise noise, double start_s,
+                                     bool repair_stamps,
                                      std::function<void(const Progress&)> listener)
-    : camera_(camera), noise_(noise), start_s_(start_s), listener_(std::move(listener)) {
+    : camera_(camera),
+      noise_(noise),
+      start_s_(start_s),
+      repair_stamps_(repair_stamps),
+      listener_(std::move(listener)) {
   progress_.message = "collecting the first frames";
 }
 
@@ -96,10 +102,16 @@ Status OnlineCalibration::TryStart() {
   recording.camera = camera_;
   recording.match_noise = noise_;
   recording.gyro.assign(gyro_.begin(), gyro_.end());
+  std::vector<int64_t> stamps_ns;
   for (const OnlineFrame& frame : frames_) {
     recording.frames.emplace_back().stamp_ns = frame.stamp_ns;
     recording.tracks.push_back(frame.points);
+    stamps_ns.push_back(frame.stamp_ns);
   }
+  recording.camera_stamps = FindStampClock(stamps_ns).report;
+  StampReport& stamps = *recording.camera_stamps;
+  stamps.repaired = repair_stamps_ && stamps.kind == StampKind::kArrival;
+  progress_.frame_stamps = stamps;
   StartOptions options;
   options.search_s = kSearchS;
   const Result<StartResult> start =
@@ -174,6 +186,9 @@ void OnlineCalibration::Remember(const WindowUpdate& update) {
   progress_.frame_stamp_ns = update.frame_stamp_ns;
   progress_.noise_px = update.noise_px;
   progress_.clock_skew = update.clock_skew;
+  progress_.frame_offset_s = update.frame_offset_s;
+  progress_.frame_offset_sigma_s = update.frame_offset_sigma_s;
+  progress_.frame_spread_s = update.frame_spread_s;
   history_.emplace_back(update.frame_stamp_ns, update.estimate);
   while (history_.size() > 2 &&
          SecondsSince(history_[1].first, update.frame_stamp_ns) >= kSteadyS) {

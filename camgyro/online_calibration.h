@@ -33,15 +33,20 @@ class OnlineCalibration {
     int64_t frame_stamp_ns = 0;
     double noise_px = 0.0;
     double clock_skew = 0.0;  // how fast the delay grows at that frame
+    // What the frames' stamps are, since a start was searched; `repaired`: the estimate gives each
+    // frame a time of its own, and these are that frame's and its spread.
+    std::optional<StampReport> frame_stamps;
+    double frame_offset_s = 0.0, frame_offset_sigma_s = 0.0, frame_spread_s = 0.0;
     // Largest change of each parameter within the last two seconds of the camera; infinite before.
     StateVector movement = StateVector::Constant(std::numeric_limits<double>::infinity());
     uint64_t frames = 0, pairs_used = 0, pairs_skipped = 0;
     int starts = 0;
   };
 
-  // start_s: of frames before the first search for a start. `listener` is called after each frame
-  // and each solved window.
-  OnlineCalibration(const CameraGuess& camera, MatchNoise noise, double start_s,
+  // start_s: of frames before the first search for a start. repair_stamps: frames whose stamps are
+  // clearly times of arrival get times of their own. `listener` is called after each frame and each
+  // solved window.
+  OnlineCalibration(const CameraGuess& camera, MatchNoise noise, double start_s, bool repair_stamps,
                     std::function<void(const Progress&)> listener);
 
   void AddGyro(const GyroSample& sample);
@@ -63,6 +68,7 @@ class OnlineCalibration {
   const CameraGuess camera_;
   const MatchNoise noise_;
   const double start_s_;
+  const bool repair_stamps_;
   const std::function<void(const Progress&)> listener_;
   Progress progress_;
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "camgyro/convert.h"
+#include "frontend/stamp_clock.h"
 
 namespace camgyro::api {
 namespace {
@@ -57,11 +58,15 @@ Snapshot MakeSnapshot(const OnlineCalibration::Progress& progress,
   next.stage = progress.estimating ? Stage::kEstimating : Stage::kCollecting;
   next.message = progress.message;
   next.frame_stamp_ns = progress.frame_stamp_ns;
+  next.frame_offset_s = progress.frame_offset_s;
+  next.frame_offset_sigma_s = progress.frame_offset_sigma_s;
+  next.frame_jitter_s = progress.frame_spread_s;
   next.noise_px = progress.noise_px;
   next.frames = progress.frames;
   next.pairs_used = progress.pairs_used;
   next.pairs_skipped = progress.pairs_skipped;
   next.starts = progress.starts;
+  if (progress.frame_stamps) next.frame_stamps = DescribeStamps(*progress.frame_stamps);
   if (progress.estimate) FillEstimate(progress, options, &next);
   return next;
 }

@@ -29,7 +29,9 @@ void TotalError::Renew(const VinsInput& latest, MatchNoise noise,
   recording.accel = latest.accel;
   if (recording.frames.size() < 2 || recording.gyro.size() < 2) return;
 
-  // The clocks' rates are in the model. Here the delay is that of the first sample.
+  // The clocks' rates are in the model, and the frames' own times. Here the delay is that of the
+  // first sample.
+  recording.camera_stamps = progress.frame_stamps;
   CalibrationReport report;
   camgyro::Calibration& calibration = report.calibration;
   calibration = *progress.estimate;
@@ -42,6 +44,9 @@ void TotalError::Renew(const VinsInput& latest, MatchNoise noise,
       SecondsSince(recording.gyro.front().stamp_ns, progress.frame_stamp_ns),
       std::numeric_limits<double>::quiet_NaN()};
   calibration.delay_s += progress.estimate->delay_s - DelayOf(calibration, latest_frame);
+  if (const int spread = calibration.effects->frame_time_spread(); spread >= 0) {
+    calibration.effect_values[spread] = progress.frame_spread_s;
+  }
   calibration.effect_covariance =
       Eigen::MatrixXd::Zero(calibration.effect_values.size(), calibration.effect_values.size());
   report.prior = {calibration, progress.prior_sigma};

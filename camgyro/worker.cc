@@ -184,7 +184,7 @@ void Calibrator::Worker::Process(const std::vector<GyroSample>& recorded, FrameI
                                  MatchNoise noise) {
   const std::vector<GyroSample> gyro = TakeGyro(recorded);
   if (!online_ && frame != nullptr) {
-    online_.emplace(camera_, noise, options_.start_s,
+    online_.emplace(camera_, noise, options_.start_s, options_.stamps == Stamps::kAuto,
                     [this](const OnlineCalibration::Progress& progress) { Publish(progress); });
     for (const GyroSample& sample : early_gyro_) online_->AddGyro(sample);
     early_gyro_.clear();

@@ -91,6 +91,11 @@ void SlidingWindow::Process(const Pending& pair) {
   update.frame_stamp_ns = pair.stamp_b_ns;
   update.noise_px = noise_px_;
   update.settled = settled_;
+  if (graph_.has_frame_times()) {
+    update.frame_offset_s = newest_frame_.offset_s;
+    update.frame_offset_sigma_s = newest_frame_.sigma_s;
+    update.frame_spread_s = graph_.frame_time_spread_s();
+  }
   latest_ = std::move(update);
   if (listener_) listener_(latest_);
 
@@ -149,6 +154,7 @@ void SlidingWindow::UpdateNoise() {
 
 void SlidingWindow::UpdateFrameTimes() {
   const std::vector<PairTimes> times = graph_.FrameTimes();
+  newest_frame_ = OffsetsOf(times, graph_.frame_time_spread_s()).back();
   const Spread here = MostLikelySpread(times);
   const double before_s = graph_.frame_time_spread_s();
   // A window in which the camera rests says nothing of it.

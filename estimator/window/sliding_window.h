@@ -52,6 +52,10 @@ struct WindowUpdate {
   // Of clocks whose rates walk: how fast the delay grows. The estimate's delay is that of the
   // frame, and its effect is at zero.
   double clock_skew = 0.0;
+  // Where frames have times of their own (frame_stamp_jitter): how much later the frame was taken
+  // than its stamp and the estimate's delay say, with its standard deviation; and the spread of
+  // that over the frames.
+  double frame_offset_s = 0.0, frame_offset_sigma_s = 0.0, frame_spread_s = 0.0;
 };
 
 class SlidingWindow {
@@ -116,6 +120,7 @@ class SlidingWindow {
   double noise_px_ = 1.0;
   CrossFit cross_fit_;
   bool settled_ = false;
+  FrameOffset newest_frame_;  // if frames have times of their own
   std::string failure_;
 };
 

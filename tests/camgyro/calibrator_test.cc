@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 #include <string>
 #include <thread>
@@ -106,6 +107,76 @@ TEST(Calibrator, LaysArrivalTimesOnTheirClock) {
   EXPECT_THAT(snapshot->gyro_stamps, testing::HasSubstr("arrival times"));
   ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
   EXPECT_NEAR(snapshot->calibration.delay_s, s.truth.delay_s + std::log(2.0) * 2e-3, 0.4e-3);
+}
+
+// The stamps of a phone's frames: late by 2 ms in the mean, some by 10. The delay is that of the
+// mean stamp, and the latest frame's own time is known. Stamps that are taken as they are put
+// parameters off by many of their sigmas.
+TEST(Calibrator, FramesThatCameLateHaveTimesOfTheirOwn) {
+  Scenario scenario = LivelyScenario(14.0);
+  scenario.effects.frame_stamp_jitter.latency_s = 2e-3;
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const Recording& r = s.recording;
+  const auto calibrator = Make(OptionsFor(scenario));
+  size_t gyro = 0;
+  int estimates = 0;
+  double sum_sq_s = 0.0, sum_sq_sigmas = 0.0;
+  std::map<int64_t, double> delays_s;
+  for (size_t i = 0; i < r.frames.size(); ++i) {
+    ASSERT_EQ(Add(calibrator.get(), r, i), AddResult::kAccepted);
+    delays_s[r.frames[i].stamp_ns] = s.frames[i].delay_s;
+    const int64_t exposed_ns = StampAt(r.frames[i].stamp_ns, s.frames[i].delay_s + 0.02);
+    for (; gyro < r.gyro.size() && r.gyro[gyro].stamp_ns <= exposed_ns; ++gyro) {
+      ASSERT_EQ(Add(calibrator.get(), r.gyro[gyro]), AddResult::kAccepted);
+    }
+    ASSERT_TRUE(calibrator->WaitUntilIdle(60.0));
+    const auto snapshot = calibrator->snapshot();
+    if (!snapshot->has_estimate || i < 300) continue;
+    ++estimates;
+    const double error_s = snapshot->calibration.delay_s + snapshot->frame_offset_s -
+                           delays_s.at(snapshot->frame_stamp_ns);
+    sum_sq_s += error_s * error_s;
+    sum_sq_sigmas += std::pow(error_s / snapshot->frame_offset_sigma_s, 2);
+  }
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  EXPECT_THAT(snapshot->frame_stamps, testing::HasSubstr("arrival times"));
+  EXPECT_NEAR(snapshot->frame_jitter_s, 2e-3, 0.7e-3);
+  EXPECT_LT(snapshot->parameters[kDelay].sigma, 0.7e-3);
+  EXPECT_EQ(estimates, 121);
+  // A pair tells mostly the difference of its two frames' offsets.
+  EXPECT_LT(std::sqrt(sum_sq_s / estimates), 1.2e-3);
+  EXPECT_LT(sum_sq_sigmas / estimates, 1.5);            // latencies are not Gaussian
+  const auto largest_error = [&](const Snapshot& of) {  // in sigmas
+    const Calibration& c = of.calibration;
+    double largest = 0.0;
+    for (const auto& [parameter, error] :
+         {std::pair(kFocal, c.focal_px - s.truth.lens[camgyro::kFocal]),
+          std::pair(kCx, c.principal_px[0] - s.truth.lens[camgyro::kCx]),
+          std::pair(kCy, c.principal_px[1] - s.truth.lens[camgyro::kCy]),
+          std::pair(kReadout, c.readout_s - s.truth.readout_s),
+          std::pair(kDelay, c.delay_s - (s.truth.delay_s - 2e-3))}) {
+      largest = std::max(largest, std::abs(error) / of.parameters[parameter].sigma);
+    }
+    return largest;
+  };
+  EXPECT_LT(largest_error(*snapshot), 3.0);
+  EXPECT_LT(snapshot->parameters[kReadout].sigma, 0.2e-3);
+  VinsSettings settings;
+  settings.accel_noise_m_s2_rtHz = scenario.gyro.accel_noise_density_m_s2_rtHz;
+  for (const AccelSample& sample : r.accel) {
+    ASSERT_EQ(Add(calibrator.get(), sample), AddResult::kAccepted);
+  }
+  const VinsStart start = calibrator->InitialiseVins(settings);
+  EXPECT_EQ(start.verdict, VinsVerdict::kReady) << start.explanation;
+
+  CalibratorOptions as_recorded = OptionsFor(scenario);
+  as_recorded.stamps = Stamps::kRecorded;
+  const auto other = Make(as_recorded);
+  Feed(other.get(), r);
+  ASSERT_TRUE(other->WaitUntilIdle(120.0));
+  EXPECT_EQ(other->snapshot()->frame_jitter_s, 0.0);
+  EXPECT_GT(largest_error(*other->snapshot()), 4.0);
 }
 
 // The delay of a flight controller's stamps, which grows by 20 to 30 ms in a minute.
