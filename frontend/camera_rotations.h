@@ -24,10 +24,12 @@ std::vector<FramePair> PairsForRotations(const Recording& recording);
 std::vector<FramePair> SpreadPairs(const std::vector<FramePair>& pairs, size_t max_pairs);
 
 // EstimateCameraRotation (two_view_rotation.h) of each pair with the recording's declared lens (the
-// centre of the picture where it declares no principal point), and this focal length [px]. Pairs
-// whose rotation cannot be found are left out.
-std::vector<CameraRotation> CameraRotationsOf(const std::vector<FramePair>& pairs,
-                                              const CameraGuess& camera, double focal_px);
+// centre of the picture where it declares no principal point), and each of these focal lengths
+// [px]. Pairs whose rotation cannot be found are left out. Focal lengths in ascending order, some
+// per cent apart, share most of the work.
+std::vector<std::vector<CameraRotation>> CameraRotationsOf(const std::vector<FramePair>& pairs,
+                                                           const CameraGuess& camera,
+                                                           const std::vector<double>& focals_px);
 
 }  // namespace camgyro
 

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -18,11 +19,6 @@ namespace {
 struct RayMatch {
   Eigen::Vector3d a, b;
   Eigen::Matrix<double, 3, 2> J_a_px, J_b_px;
-};
-
-struct Motion {
-  Eigen::Matrix3d R_a_b = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d tau = Eigen::Vector3d::UnitZ();
 };
 
 // Median absolute residual as a standard deviation, corrected for the parameters fitted.
@@ -62,8 +58,10 @@ struct RotationFit {
 
 // Rotation alone, as if there were no translation. Iteratively re-weighted Gauss-Newton on the
 // transfer error of a into the second image [px].
-RotationFit FitRotationOnly(const std::vector<RayMatch>& matches, double min_sigma_px) {
+RotationFit FitRotationOnly(const std::vector<RayMatch>& matches, double min_sigma_px,
+                            const Eigen::Matrix3d& begin_at) {
   RotationFit fit;
+  fit.R_a_b = begin_at;
   std::vector<Eigen::Vector2d> residuals(matches.size());
   std::vector<Eigen::Matrix<double, 2, 3>> jacobians(matches.size());
   std::vector<double> squared(matches.size());
@@ -116,7 +114,7 @@ Eigen::Matrix<double, 3, 2> TangentOf(const Eigen::Vector3d& unit) {
 class JointProblem {
  public:
   JointProblem(const std::vector<RayMatch>& matches, const Eigen::Matrix3d& R_a_b)
-      : matches_(matches), normals_(matches.size()) {
+      : matches_(matches), noise_(matches.size()) {
     SetNoiseRotation(R_a_b);
   }
 
@@ -129,41 +127,38 @@ class JointProblem {
   void SetNoiseRotation(const Eigen::Matrix3d& R_a_b) {
     for (size_t i = 0; i < matches_.size(); ++i) {
       const RayMatch& match = matches_[i];
-      normals_[i] = MakeCoplanarityNormal(
+      noise_[i] = MakeCoplanarityNormal(
           {match.a, R_a_b * match.b, match.J_a_px, R_a_b * match.J_b_px}, MatchNoise::kBothImages);
     }
   }
 
   // Squared residuals [px^2] of all matches.
-  std::vector<double> SquaredResiduals(const Motion& motion) {
+  std::vector<double> SquaredResiduals(const TwoViewMotion& motion) const {
     std::vector<double> squared(matches_.size());
-    for (size_t i = 0; i < matches_.size(); ++i) {
-      const Eigen::Vector3d& a = matches_[i].a;
-      normals_[i].n = a.cross(motion.R_a_b * matches_[i].b);
-      squared[i] = normals_[i].SquaredDistance(motion.tau);
-      const Eigen::Vector3d forward = motion.tau.cross(a);
-      if (forward.dot(normals_[i].n) < 0.0) squared[i] += normals_[i].SquaredDistance(forward);
-    }
+    for (size_t i = 0; i < matches_.size(); ++i) squared[i] = SquaredResidual(i, motion);
     return squared;
   }
 
-  double Cost(const Motion& motion, const RobustLoss& loss) {
+  double Cost(const TwoViewMotion& motion, const RobustLoss& loss) const {
     double cost = 0.0;
-    for (const double squared : SquaredResiduals(motion)) cost += loss.Loss(squared);
+    for (size_t i = 0; i < matches_.size(); ++i) cost += loss.Loss(SquaredResidual(i, motion));
     return cost;
   }
 
-  Linearised Linearise(const Motion& motion, const RobustLoss& loss) {
+  Linearised Linearise(const TwoViewMotion& motion, const RobustLoss& loss) const {
     Linearised out;
     out.hessian.setZero();
     out.gradient.setZero();
     out.tangent = TangentOf(motion.tau);
     for (size_t i = 0; i < matches_.size(); ++i) {
       const Residual one = LineariseOne(i, motion, out.tangent);
-      const double weight = loss.Weight(one.value.squaredNorm());
-      out.hessian += weight * one.jacobian.transpose() * one.jacobian;
-      out.gradient += weight * one.jacobian.transpose() * one.value;
+      const double weight = loss.Weight(one.Squared());
+      out.hessian += one.Square(weight);
+      out.gradient += weight * one.value[0] * one.by[0];
+      if (one.is_behind) out.gradient += weight * one.value[1] * one.by[1];
     }
+    out.hessian = InCameraB(out.hessian, motion);
+    out.gradient.head<3>() = (motion.R_a_b.transpose() * out.gradient.head<3>()).eval();
     return out;
   }
 
@@ -173,28 +168,29 @@ class JointProblem {
   // Noise in the normals looks like parallax and inflates the information on tau (errors in
   // variables: docs/architecture.md, traps). Its expectation is taken off again, up to half: the
   // rest is needed where there is no parallax at all.
-  RotationFit FitWithCovariance(const Motion& motion, const RobustLoss& loss) {
+  RotationFit FitWithCovariance(const TwoViewMotion& motion, const RobustLoss& loss) const {
     RotationFit fit;
     fit.R_a_b = motion.R_a_b;
-    const std::vector<double> squared = SquaredResiduals(motion);
     const Eigen::Matrix<double, 3, 2> tangent = TangentOf(motion.tau);
     Eigen::Matrix<double, 5, 5> information = Eigen::Matrix<double, 5, 5>::Zero();
     Eigen::Matrix2d noise = Eigen::Matrix2d::Zero();
     double sum_psi_sq = 0.0, sum_slope = 0.0, count = 0.0;
     for (size_t i = 0; i < matches_.size(); ++i) {
-      if (!loss.IsInlier(squared[i])) continue;
       const Residual one = LineariseOne(i, motion, tangent);
-      information += one.jacobian.transpose() * one.jacobian;
-      const double weight = loss.Weight(squared[i]);
-      sum_psi_sq += weight * weight * squared[i];
-      sum_slope += loss.Slope(squared[i]);
+      const double squared = one.Squared();
+      if (!loss.IsInlier(squared)) continue;
+      information += one.Square(1.0);
+      const double weight = loss.Weight(squared);
+      sum_psi_sq += weight * weight * squared;
+      sum_slope += loss.Slope(squared);
       count += 1.0;
       // What varies in n while tau . n is held.
-      const double variance = normals_[i].Variance(motion.tau);
-      const Eigen::Vector3d cov_tau = normals_[i].cov_n * motion.tau;
-      noise += tangent.transpose() *
-               (normals_[i].cov_n - cov_tau * cov_tau.transpose() / variance) * tangent / variance;
+      const double variance = noise_[i].Variance(motion.tau);
+      const Eigen::Vector3d cov_tau = noise_[i].cov_n * motion.tau;
+      noise += tangent.transpose() * (noise_[i].cov_n - cov_tau * cov_tau.transpose() / variance) *
+               tangent / variance;
     }
+    information = InCameraB(information, motion);
     const double slope = sum_slope / count;
     if (!(count > 5.0) || !(slope > 0.0)) return fit;
     fit.variance_px = sum_psi_sq / (count - 5.0) / (slope * slope);
@@ -218,7 +214,7 @@ class JointProblem {
   }
 
   // Levenberg-Marquardt at a fixed loss.
-  void Minimise(const RobustLoss& loss, int max_iterations, Motion* motion) {
+  void Minimise(const RobustLoss& loss, int max_iterations, TwoViewMotion* motion) const {
     double cost = Cost(*motion, loss);
     double damping = 1e-4;
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -226,7 +222,7 @@ class JointProblem {
       normal.hessian.diagonal() *= 1.0 + damping;
       const Eigen::Matrix<double, 5, 1> step = normal.hessian.ldlt().solve(-normal.gradient);
       if (!step.allFinite()) return;
-      Motion candidate;
+      TwoViewMotion candidate;
       candidate.R_a_b = motion->R_a_b * Exp(Eigen::Vector3d(step.head<3>())).toRotationMatrix();
       candidate.tau = (motion->tau + normal.tangent * step.tail<2>()).normalized();
       const double candidate_cost = Cost(candidate, loss);
@@ -244,75 +240,101 @@ class JointProblem {
   }
 
  private:
-  // Of one match: distance from the epipolar line and, on its wrong side, from the epipole; zero on
-  // the right side. [px]
+  // Of one match: distance from the epipolar line and, on its wrong side, from the epipole. [px]
   struct Residual {
-    Eigen::Vector2d value = Eigen::Vector2d::Zero();
-    Eigen::Matrix<double, 2, 5> jacobian = Eigen::Matrix<double, 2, 5>::Zero();
+    bool is_behind = false;  // on the wrong side; else only the first of the two is there
+    std::array<double, 2> value;
+    // By a rotation in camera a (left perturbation), and by the tangent of tau.
+    std::array<Eigen::Matrix<double, 5, 1>, 2> by;
+
+    double Squared() const { return value[0] * value[0] + (is_behind ? value[1] * value[1] : 0.0); }
+    Eigen::Matrix<double, 5, 5> Square(double weight) const {
+      Eigen::Matrix<double, 5, 5> square = (weight * by[0]) * by[0].transpose();
+      if (is_behind) square += (weight * by[1]) * by[1].transpose();
+      return square;
+    }
   };
 
-  Residual LineariseOne(size_t i, const Motion& motion,
-                        const Eigen::Matrix<double, 3, 2>& tangent) {
-    const RayMatch& match = matches_[i];
-    CoplanarityNormal& normal = normals_[i];
-    normal.n = match.a.cross(motion.R_a_b * match.b);
+  // What was of a rotation in camera a, for one in camera b.
+  static Eigen::Matrix<double, 5, 5> InCameraB(const Eigen::Matrix<double, 5, 5>& square,
+                                               const TwoViewMotion& motion) {
+    Eigen::Matrix<double, 5, 5> turn = Eigen::Matrix<double, 5, 5>::Identity();
+    turn.topLeftCorner<3, 3>() = motion.R_a_b;
+    return turn.transpose() * square * turn;
+  }
+
+  double SquaredResidual(size_t i, const TwoViewMotion& motion) const {
+    const Eigen::Vector3d& a = matches_[i].a;
+    CoplanarityNormal normal = noise_[i];
+    normal.n = a.cross(motion.R_a_b * matches_[i].b);
+    const double squared = normal.SquaredDistance(motion.tau);
+    const Eigen::Vector3d forward = motion.tau.cross(a);
+    return forward.dot(normal.n) < 0.0 ? squared + normal.SquaredDistance(forward) : squared;
+  }
+
+  Residual LineariseOne(size_t i, const TwoViewMotion& motion,
+                        const Eigen::Matrix<double, 3, 2>& tangent) const {
+    const Eigen::Vector3d& a = matches_[i].a;
+    const Eigen::Vector3d b = motion.R_a_b * matches_[i].b;
+    const Eigen::Vector3d n = a.cross(b);
     Residual residual;
     // v . n / sigma(v) with its derivatives, for v = v(tau).
-    const auto fill = [&](int row, const Eigen::Vector3d& v,
+    const auto fill = [&](size_t row, const Eigen::Vector3d& v,
                           const Eigen::Matrix<double, 3, 2>& J_v_tangent) {
-      const double variance = normal.Variance(v), sigma = std::sqrt(variance);
-      residual.value[row] = v.dot(normal.n) / sigma;
-      // v . (a x R Exp(d) b) = (v x a) . R (b + d x b)
-      residual.jacobian.block<1, 3>(row, 0) =
-          match.b.cross(motion.R_a_b.transpose() * v.cross(match.a)) / sigma;
-      residual.jacobian.block<1, 2>(row, 3) =
-          (normal.n / sigma - residual.value[row] / variance * (normal.cov_n * v)).transpose() *
-          J_v_tangent;
+      const double variance = noise_[i].Variance(v), inv_sigma = 1.0 / std::sqrt(variance);
+      residual.value[row] = v.dot(n) * inv_sigma;
+      // v . (a x Exp(d) b) = (v x a) . (b + d x b)
+      residual.by[row].head<3>() = inv_sigma * b.cross(v.cross(a));
+      residual.by[row].tail<2>() =
+          J_v_tangent.transpose() *
+          (inv_sigma * n - (residual.value[row] / variance) * (noise_[i].cov_n * v));
     };
     fill(0, motion.tau, tangent);
-    const Eigen::Vector3d forward = motion.tau.cross(match.a);
-    if (forward.dot(normal.n) < 0.0) fill(1, forward, -Hat(match.a) * tangent);
+    const Eigen::Vector3d forward = motion.tau.cross(a);
+    residual.is_behind = forward.dot(n) < 0.0;
+    if (residual.is_behind) fill(1, forward, -Hat(a) * tangent);
     return residual;
   }
 
   const std::vector<RayMatch>& matches_;
-  std::vector<CoplanarityNormal> normals_;
+  std::vector<CoplanarityNormal> noise_;  // cov_n of each match; n is not used
 };
 
-// Rotation and translation direction together, from the rotation alone and six directions.
-RotationFit FitRotationAndTranslation(const std::vector<RayMatch>& matches, double min_sigma_px) {
-  Motion start;
-  RotationFit alone = FitRotationOnly(matches, min_sigma_px);
-  start.R_a_b = alone.R_a_b;
-  JointProblem problem(matches, start.R_a_b);
+// A motion and the spread of its residuals [px].
+struct Candidate {
+  double spread_px = 0.0;
+  TwoViewMotion motion;
+};
 
-  struct Candidate {
-    double spread_px;
-    Motion motion;
-  };
-  const auto spread_of = [&](const Motion& motion) {
-    return std::max(min_sigma_px, SpreadOf(problem.SquaredResiduals(motion), 5));
-  };
-  const auto settle = [&](Candidate* candidate) {
-    problem.Minimise(RobustLoss(candidate->spread_px), 4, &candidate->motion);
-    candidate->spread_px = spread_of(candidate->motion);
-  };
+double SpreadAt(const JointProblem& problem, const TwoViewMotion& motion, double min_sigma_px) {
+  return std::max(min_sigma_px, SpreadOf(problem.SquaredResiduals(motion), 5));
+}
+
+// A few steps at the spread of its own residuals.
+void Settle(const JointProblem& problem, double min_sigma_px, Candidate* candidate) {
+  problem.Minimise(RobustLoss(candidate->spread_px), 4, &candidate->motion);
+  candidate->spread_px = SpreadAt(problem, candidate->motion, min_sigma_px);
+}
+
+// The best motion from a rotation and six directions. Each at the spread of its own residuals, the
+// most promising again; then these compete at the least spread.
+Candidate SearchDirections(const JointProblem& problem, const Eigen::Matrix3d& R_a_b,
+                           double min_sigma_px) {
   const auto sort = [](std::vector<Candidate>* candidates) {
     std::stable_sort(candidates->begin(), candidates->end(),
                      [](const auto& x, const auto& y) { return x.spread_px < y.spread_px; });
   };
-
-  // Each at the spread of its own residuals, the most promising again; then these compete at the
-  // least spread.
   std::vector<Candidate> candidates;
   for (int axis = 0; axis < 6; ++axis) {
-    start.tau = (axis < 3 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis % 3);
-    candidates.push_back({spread_of(start), start});
-    settle(&candidates.back());
+    Candidate& next = candidates.emplace_back();
+    next.motion.R_a_b = R_a_b;
+    next.motion.tau = (axis < 3 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis % 3);
+    next.spread_px = SpreadAt(problem, next.motion, min_sigma_px);
+    Settle(problem, min_sigma_px, &next);
   }
   sort(&candidates);
   candidates.resize(3);
-  for (Candidate& candidate : candidates) settle(&candidate);
+  for (Candidate& candidate : candidates) Settle(problem, min_sigma_px, &candidate);
   sort(&candidates);
 
   Candidate best = candidates.front();
@@ -326,13 +348,30 @@ RotationFit FitRotationAndTranslation(const std::vector<RayMatch>& matches, doub
       best.motion = candidate.motion;
     }
   }
+  return best;
+}
+
+// Rotation and translation direction together; `motion` as of EstimateCameraRotation.
+RotationFit FitRotationAndTranslation(const std::vector<RayMatch>& matches, double min_sigma_px,
+                                      std::optional<TwoViewMotion>* motion) {
+  RotationFit alone = FitRotationOnly(matches, min_sigma_px,
+                                      *motion ? (*motion)->R_a_b : Eigen::Matrix3d::Identity());
+  JointProblem problem(matches, *motion ? (*motion)->R_a_b : alone.R_a_b);
+  Candidate best;
+  if (*motion) {
+    best.motion = **motion;
+    best.spread_px = SpreadAt(problem, best.motion, min_sigma_px);
+  } else {
+    best = SearchDirections(problem, alone.R_a_b, min_sigma_px);
+  }
   // Wrong matches lose their hold as the spread falls.
   problem.SetNoiseRotation(best.motion.R_a_b);
   for (int round = 0; round < 8; ++round) {
     const double spread_px = best.spread_px;
-    settle(&best);
+    Settle(problem, min_sigma_px, &best);
     if (best.spread_px > 0.97 * spread_px) break;
   }
+  *motion = best.motion;
   const RotationFit joint = problem.FitWithCovariance(best.motion, RobustLoss(best.spread_px));
 
   // Where nothing translated, a free translation costs a factor of six in the rotation's error. The
@@ -354,7 +393,8 @@ RotationFit FitRotationAndTranslation(const std::vector<RayMatch>& matches, doub
 
 std::optional<CameraRotation> EstimateCameraRotation(const FramePair& pair, const Lens& lens_model,
                                                      const LensParameters& lens,
-                                                     const TwoViewOptions& options) {
+                                                     const TwoViewOptions& options,
+                                                     std::optional<TwoViewMotion>* motion) {
   std::vector<RayMatch> matches;
   matches.reserve(pair.matches.size());
   for (const Match& match : pair.matches) {
@@ -367,9 +407,11 @@ std::optional<CameraRotation> EstimateCameraRotation(const FramePair& pair, cons
   }
   if (static_cast<int>(matches.size()) < std::max(options.min_matches, 8)) return std::nullopt;
 
-  const RotationFit fit = options.with_translation
-                              ? FitRotationAndTranslation(matches, options.min_sigma_px)
-                              : FitRotationOnly(matches, options.min_sigma_px);
+  std::optional<TwoViewMotion> unknown;
+  const RotationFit fit =
+      options.with_translation
+          ? FitRotationAndTranslation(matches, options.min_sigma_px, motion ? motion : &unknown)
+          : FitRotationOnly(matches, options.min_sigma_px, Eigen::Matrix3d::Identity());
   if (!fit.covariance || !(fit.covariance->trace() > 0.0)) return std::nullopt;
   CameraRotation rotation;
   rotation.frame_a = pair.frame_a;

@@ -25,9 +25,11 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
   return summary;
 }
 
-CameraRotationsAtFocal RotationsFrom(const Recording& recording, size_t max_pairs) {
-  return [pairs = SpreadPairs(PairsForRotations(recording), max_pairs), camera = recording.camera](
-             double focal_px) { return CameraRotationsOf(pairs, camera, focal_px); };
+CameraRotationsAtFocals RotationsFrom(const Recording& recording, size_t max_pairs) {
+  return [pairs = SpreadPairs(PairsForRotations(recording), max_pairs),
+          camera = recording.camera](const std::vector<double>& focals_px) {
+    return CameraRotationsOf(pairs, camera, focals_px);
+  };
 }
 
 Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEstimator estimator,
@@ -35,7 +37,7 @@ Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEst
                                       Recording* recording) {
   const Result<TrackingSummary> tracking = EnsureImageMotion(progress, recording);
   if (!tracking) return tl::unexpected(tracking.error());
-  const CameraRotationsAtFocal rotations_at = RotationsFrom(*recording);
+  const CameraRotationsAtFocals rotations_at = RotationsFrom(*recording);
   Result<CalibrationReport> report =
       estimator == OnlineEstimator::kPaperEkf
           ? CalibrateWithEkf(*recording, rotations_at, options, {})

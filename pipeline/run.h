@@ -24,7 +24,7 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
 
 // Rotations between frames at a trial focal length, from at most `max_pairs` pairs of frames. The
 // function holds a copy of them: the recording may go.
-CameraRotationsAtFocal RotationsFrom(const Recording& recording, size_t max_pairs = 400);
+CameraRotationsAtFocals RotationsFrom(const Recording& recording, size_t max_pairs = 400);
 
 // Which estimator goes along with the frames: ours, or the filter of Jia & Evans as published,
 // without refinement, for comparison.

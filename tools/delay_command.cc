@@ -96,7 +96,8 @@ Result<DelayReport> FindDelay(const Recording& recording, ProgressBar* bar) {
   if (!start) return tl::unexpected(start.error());
   if (start->focal) {
     rotations =
-        CameraRotationsOf(PairsForRotations(recording), recording.camera, start->focal->value_px);
+        CameraRotationsOf(PairsForRotations(recording), recording.camera, {start->focal->value_px})
+            .front();
   }
   DelayReport report;
   report.start = std::move(*start);

@@ -82,7 +82,7 @@ Eigen::MatrixXd FitParabola(const Eigen::VectorXd& x, const Eigen::MatrixXd& y) 
 // The scan over focal lengths, step by step.
 class FocalScan {
  public:
-  FocalScan(const Recording& recording, const CameraRotationsAtFocal& rotations_at,
+  FocalScan(const Recording& recording, const CameraRotationsAtFocals& rotations_at,
             const StartOptions& options, const FocalScanOptions& scan_options)
       : recording_(recording),
         rotations_at_(rotations_at),
@@ -95,8 +95,8 @@ class FocalScan {
     points_.resize(static_cast<size_t>(scan_options.points));
     for (size_t k = 0; k < points_.size(); ++k) {
       points_[k].log_focal = log_min + spacing_ * static_cast<double>(k);
-      points_[k].rotations = rotations_at(std::exp(points_[k].log_focal));
     }
+    FindRotations(&points_);
   }
 
   // Delay and orientation, to which a wrong focal length is mostly a scale: from the points nearest
@@ -127,10 +127,11 @@ class FocalScan {
     for (ScanPoint& point : points_) MeasureAt(&point);
     Truncate();
     const double coarse = points_[BestPoint()].log_focal;
-    for (const double offset : {-0.5 * spacing_, 0.5 * spacing_}) {
-      ScanPoint point;
-      point.log_focal = coarse + offset;
-      point.rotations = rotations_at_(std::exp(point.log_focal));
+    std::vector<ScanPoint> between(2);
+    between[0].log_focal = coarse - 0.5 * spacing_;
+    between[1].log_focal = coarse + 0.5 * spacing_;
+    FindRotations(&between);
+    for (ScanPoint& point : between) {
       MeasureAt(&point);
       points_.push_back(std::move(point));
     }
@@ -169,6 +170,13 @@ class FocalScan {
   }
 
  private:
+  void FindRotations(std::vector<ScanPoint>* points) const {
+    std::vector<double> focals_px;
+    for (const ScanPoint& point : *points) focals_px.push_back(std::exp(point.log_focal));
+    std::vector<std::vector<CameraRotation>> rotations = rotations_at_(focals_px);
+    for (size_t k = 0; k < points->size(); ++k) (*points)[k].rotations = std::move(rotations[k]);
+  }
+
   void MeasureAt(ScanPoint* point) const {
     // The inverse of what FindStart makes of a lag.
     const double lag_s =
@@ -226,7 +234,7 @@ class FocalScan {
   }
 
   const Recording& recording_;
-  const CameraRotationsAtFocal& rotations_at_;
+  const CameraRotationsAtFocals& rotations_at_;
   const StartOptions& options_;
   const double log_guess_, spacing_;
   std::vector<ScanPoint> points_;
@@ -238,7 +246,7 @@ class FocalScan {
 }  // namespace
 
 Result<StartResult> FindStartAndFocal(const Recording& recording,
-                                      const CameraRotationsAtFocal& rotations_at,
+                                      const CameraRotationsAtFocals& rotations_at,
                                       const StartOptions& options,
                                       const FocalScanOptions& scan_options) {
   if (!(std::max(recording.camera.width_px, recording.camera.height_px) > 0)) {
@@ -256,7 +264,7 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   scan.Scan();
   StartFocal focal = scan.Fit();
   // The start at that focal length.
-  auto start = FindStart(recording, rotations_at(focal.value_px), options);
+  auto start = FindStart(recording, rotations_at({focal.value_px}).front(), options);
   if (!start) return start;
   if (!focal.determined) {
     start->notes.push_back(

@@ -13,7 +13,8 @@ namespace camgyro {
 
 // Camera rotations of a recording as its pictures give them for a focal length [px]. Called about
 // thirty times; a few hundred pairs are enough.
-using CameraRotationsAtFocal = std::function<std::vector<CameraRotation>(double focal_px)>;
+using CameraRotationsAtFocals =
+    std::function<std::vector<std::vector<CameraRotation>>(const std::vector<double>& focals_px)>;
 
 struct FocalScanOptions {
   // Of the picture's longer side: 0.4 is a full field of view of 103 deg, 1.8 of 31 deg.
@@ -30,7 +31,7 @@ struct FocalScanOptions {
 // minimum is shallow, focal->determined is false, a note says so, and the recording's guess is
 // used, or 0.85 of the longer side without one.
 Result<StartResult> FindStartAndFocal(const Recording& recording,
-                                      const CameraRotationsAtFocal& rotations_at,
+                                      const CameraRotationsAtFocals& rotations_at,
                                       const StartOptions& options,
                                       const FocalScanOptions& scan_options);
 

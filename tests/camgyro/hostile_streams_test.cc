@@ -112,9 +112,12 @@ TEST_P(HostileStreams, CalibrateAnswers) {
     ASSERT_GT(recording.gyro[i].stamp_ns, recording.gyro[i - 1].stamp_ns);
   }
   const std::vector<FramePair> pairs = PairsForRotations(recording);
-  const Result<CalibrationReport> report = CalibrateRecording(
-      recording,
-      [&](double focal_px) { return CameraRotationsOf(pairs, recording.camera, focal_px); }, {});
+  const Result<CalibrationReport> report =
+      CalibrateRecording(recording,
+                         [&](const std::vector<double>& focals_px) {
+                           return CameraRotationsOf(pairs, recording.camera, focals_px);
+                         },
+                         {});
   if (report) {
     ExpectFinite(report->calibration);
   } else {

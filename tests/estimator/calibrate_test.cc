@@ -19,9 +19,11 @@ using simulation::Simulated;
 using simulation::SimulateTracks;
 
 // Rotations from the pictures (frontend/two_view_rotation.h), as the command line makes them.
-CameraRotationsAtFocal RotationsOf(const Recording& recording) {
-  return [pairs = SpreadPairs(PairsForRotations(recording), 100), camera = recording.camera](
-             double focal_px) { return CameraRotationsOf(pairs, camera, focal_px); };
+CameraRotationsAtFocals RotationsOf(const Recording& recording) {
+  return [pairs = SpreadPairs(PairsForRotations(recording), 100),
+          camera = recording.camera](const std::vector<double>& focals_px) {
+    return CameraRotationsOf(pairs, camera, focals_px);
+  };
 }
 
 TEST(CalibrateRecording, FindsTheTruthFromAPoorGuess) {
@@ -138,8 +140,8 @@ TEST(CalibrateRecording, TakesAClockThatRunsFastIntoTheModel) {
   scenario.effects.clock_skew.ppm = 8000.0;
   const Simulated s = SimulateTracks(scenario).value();
   const auto rotations = [pairs = SpreadPairs(PairsForRotations(s.recording), 400),
-                          camera = s.recording.camera](double focal_px) {
-    return CameraRotationsOf(pairs, camera, focal_px);
+                          camera = s.recording.camera](const std::vector<double>& focals_px) {
+    return CameraRotationsOf(pairs, camera, focals_px);
   };
   const Result<CalibrationReport> report = CalibrateRecording(s.recording, rotations, {});
   ASSERT_TRUE(report.has_value()) << report.error().message;

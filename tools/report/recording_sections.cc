@@ -57,7 +57,7 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
       StandardDistortion(calibration.distortion_model, lens, size_px);
   camera.distortion_model = distortion.model;
   camera.distortion.assign(distortion.k.data(), distortion.k.data() + 4);
-  return CameraRotationsOf(SpreadPairs(pairs, kMaxCameraPoints), camera, lens[kFocal]);
+  return CameraRotationsOf(SpreadPairs(pairs, kMaxCameraPoints), camera, {lens[kFocal]}).front();
 }
 
 std::vector<RatePoint> RatePoints(const Recording& recording, const Calibration& calibration) {

@@ -145,7 +145,9 @@ TEST(DataFaults, ARateThatIsNotWhatTheFileClaims) {
 
 TEST(DataFaults, RepairsUnitAndHandedness) {
   const auto simulated = Simulate({"motion.kind=running"});
-  const auto rotations_at = [&](double) { return TrueRotations(simulated); };
+  const auto rotations_at = [&](const std::vector<double>&) {
+    return std::vector<std::vector<CameraRotation>>{TrueRotations(simulated)};
+  };
   EXPECT_FALSE([&] {  // a mirrored gyro of a sound recording explains less
     Recording sound = simulated.recording;
     for (GyroSample& sample : sound.gyro) sample.omega_gyro_rad_s.setZero();
@@ -197,7 +199,9 @@ TEST(DataFaults, ElectronicStabilisationInTheRotationsThatTheStartUses) {
     if (stabilised) overrides.push_back(stabiliser);
     const auto s = Simulate(overrides);
     const std::vector<CameraRotation> rotations =
-        CameraRotationsOf(PairsForRotations(s.recording), s.recording.camera, s.truth.lens[kFocal]);
+        CameraRotationsOf(PairsForRotations(s.recording), s.recording.camera,
+                          {s.truth.lens[kFocal]})
+            .front();
     EXPECT_EQ(FindElectronicStabilisation(s.recording, rotations).has_value(), stabilised);
   }
 }

@@ -340,7 +340,9 @@ TEST(CalibrateWithEkf, RefusesWhatHasNoRotation) {
   scenario.motion.rotation_rms_rad_s.setZero();
   scenario.gyro.accelerometer = false;
   const Simulated s = simulation::SimulateTracks(scenario).value();
-  const auto none = [](double) { return std::vector<CameraRotation>(); };
+  const auto none = [](const std::vector<double>& focals_px) {
+    return std::vector<std::vector<CameraRotation>>(focals_px.size());
+  };
   const auto report = CalibrateWithEkf(s.recording, none, {}, {});
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().kind, ErrorKind::kCannotEstimate);

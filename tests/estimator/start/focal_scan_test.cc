@@ -13,15 +13,17 @@ constexpr double kTrueFocalPx = 500.0;
 
 // Rotations as pictures give them at a wrong focal length, to first order: image motion is focal
 // length times pan and tilt, and the roll angle itself.
-CameraRotationsAtFocal SeenAt(const Simulated& s) {
-  return [&s](double focal_px) {
-    std::vector<CameraRotation> rotations = s.rotations;
-    for (CameraRotation& rotation : rotations) {
-      Eigen::Vector3d angle = Log(rotation.q_a_b);
-      angle.head<2>() *= kTrueFocalPx / focal_px;
-      rotation.q_a_b = Exp(angle);
+CameraRotationsAtFocals SeenAt(const Simulated& s) {
+  return [&s](const std::vector<double>& focals_px) {
+    std::vector<std::vector<CameraRotation>> seen(focals_px.size(), s.rotations);
+    for (size_t k = 0; k < seen.size(); ++k) {
+      for (CameraRotation& rotation : seen[k]) {
+        Eigen::Vector3d angle = Log(rotation.q_a_b);
+        angle.head<2>() *= kTrueFocalPx / focals_px[k];
+        rotation.q_a_b = Exp(angle);
+      }
     }
-    return rotations;
+    return seen;
   };
 }
 

@@ -27,7 +27,9 @@ Result<CalibrationReport> Calibrate(Recording* recording) {
   const std::vector<FramePair> pairs = SpreadPairs(PairsForRotations(*recording), 400);
   return CalibrateRecording(
       *recording,
-      [&](double focal_px) { return CameraRotationsOf(pairs, recording->camera, focal_px); },
+      [&](const std::vector<double>& focals_px) {
+        return CameraRotationsOf(pairs, recording->camera, focals_px);
+      },
       CalibrateOptions());
 }
 
