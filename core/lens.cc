@@ -78,7 +78,7 @@ class AxialLens final : public Lens {
     const double fx = f * aspect;
     const Eigen::Vector2d distorted((px.x() - lens[kCx]) / fx, (px.y() - lens[kCy]) / f);
     const bool has_distortion = equidistant_ || !lens.tail<kLensSize - kK1>().isZero(0.0);
-    if (!has_distortion && by_lens != LensDerivatives::kAll) {
+    if (!has_distortion && by_lens <= LensDerivatives::kPinhole) {
       return UnprojectPinhole(distorted, fx, f, by_lens, out);
     }
     Eigen::Vector2d xy = distorted;
@@ -98,8 +98,7 @@ class AxialLens final : public Lens {
     out->ray << xy, 1.0;
     out->J_ray_px.topRows<2>() = d.J.inverse() * Eigen::Vector2d(1.0 / fx, 1.0 / f).asDiagonal();
     out->J_ray_px.row(2).setZero();
-    out->num_lens = by_lens == LensDerivatives::kAll ? kLensSize : kAspect;
-    if (by_lens == LensDerivatives::kNone) out->num_lens = 0;
+    out->num_lens = NumDerivatives(by_lens);
     if (out->num_lens > 0) DifferentiateByLens(xy, distorted, d, lens, out);
     return true;
   }
@@ -115,6 +114,20 @@ class AxialLens final : public Lens {
   }
 
  private:
+  static int NumDerivatives(LensDerivatives by_lens) {
+    switch (by_lens) {
+      case LensDerivatives::kNone:
+        return 0;
+      case LensDerivatives::kPinhole:
+        return kAspect;
+      case LensDerivatives::kRadTan:
+        return kKb1;
+      case LensDerivatives::kAll:
+        break;
+    }
+    return kLensSize;
+  }
+
   // Without distortion, and without derivatives by it: what the rest of this class computes then,
   // without inverting a distortion that is not there.
   static bool UnprojectPinhole(const Eigen::Vector2d& xy, double fx, double fy,
@@ -122,7 +135,7 @@ class AxialLens final : public Lens {
     if (!xy.allFinite()) return false;
     out->ray << xy, 1.0;
     out->J_ray_px << 1.0 / fx, 0.0, 0.0, 1.0 / fy, 0.0, 0.0;
-    out->num_lens = by_lens == LensDerivatives::kNone ? 0 : kAspect;
+    out->num_lens = NumDerivatives(by_lens);
     if (out->num_lens == 0) return true;
     out->J_ray_lens.leftCols<kAspect>().setZero();
     out->J_ray_lens.col(kFocal).head<2>() = -xy / fy;
@@ -143,9 +156,7 @@ class AxialLens final : public Lens {
     const double p1 = lens[kP1], p2 = lens[kP2];
     const double slope = d.radial.slope, curvature = d.radial.curvature;
     const Eigen::Matrix2d J_inv = d.J.inverse();
-    Eigen::Matrix2d scale = Eigen::Matrix2d::Zero();  // d distorted / d px
-    scale(0, 0) = 1.0 / fx;
-    scale(1, 1) = 1.0 / f;
+    const Eigen::Matrix2d J_px = J_inv * Eigen::Vector2d(1.0 / fx, 1.0 / f).asDiagonal();
 
     // Second derivatives of the distortion: dJ/dx, dJ/dy (symmetric, three distinct entries).
     const auto symmetric = [](double a, double b, double c) {
@@ -158,8 +169,7 @@ class AxialLens final : public Lens {
     const Eigen::Matrix2d J_x = symmetric(dxxx, dxxy, dxyy);
     const Eigen::Matrix2d J_y = symmetric(dxxy, dxyy, dyyy);
 
-    // By each parameter: of the distorted coordinates, of the distortion at fixed xy, of its J,
-    // and of `scale`.
+    // By each parameter: of the distorted coordinates, of the distortion at fixed xy, and of its J.
     Eigen::Matrix<double, 2, kLensSize> distorted_by = Eigen::Matrix<double, 2, kLensSize>::Zero();
     distorted_by.col(kFocal) = -distorted / f;
     distorted_by(0, kCx) = -1.0 / fx;
@@ -167,12 +177,14 @@ class AxialLens final : public Lens {
     distorted_by(0, kAspect) = -distorted.x() / aspect;
     Eigen::Matrix<double, 2, kLensSize> value_by = Eigen::Matrix<double, 2, kLensSize>::Zero();
     std::array<Radial, 4> series;
-    if (out->num_lens == kLensSize) {
-      series = AngleSeries(AngleOverRadius(r2), r2);
+    if (out->num_lens >= kKb1) {
       value_by.col(kK1) = xy * r2;
       value_by.col(kK2) = xy * r2 * r2;
       value_by.col(kP1) << 2.0 * x * y, r2 + 2.0 * y * y;
       value_by.col(kP2) << r2 + 2.0 * x * x, 2.0 * x * y;
+    }
+    if (out->num_lens == kLensSize) {
+      series = AngleSeries(AngleOverRadius(r2), r2);
       for (int k = 0; k < 4; ++k) {
         value_by.col(kKb1 + k) = xy * series[static_cast<size_t>(k)].value;
       }
@@ -188,11 +200,11 @@ class AxialLens final : public Lens {
       if (k == kP1) J_k += symmetric(2.0 * y, 2.0 * x, 6.0 * y);
       if (k == kP2) J_k += symmetric(6.0 * x, 2.0 * y, 2.0 * x);
       if (k >= kKb1) J_k += RadialJacobian(x, y, series[static_cast<size_t>(k - kKb1)]);
-      Eigen::Matrix2d scale_k = Eigen::Matrix2d::Zero();
-      if (k == kFocal) scale_k = -scale / f;
-      if (k == kAspect) scale_k(0, 0) = -scale(0, 0) / aspect;
+      Eigen::Matrix2d J_px_k = -(J_inv * J_k) * J_px;
+      if (k == kFocal) J_px_k -= J_px / f;
+      if (k == kAspect) J_px_k.col(0) -= J_px.col(0) / aspect;
       out->J_ray_px_lens[k].row(2).setZero();
-      out->J_ray_px_lens[k].topRows<2>() = J_inv * (scale_k - J_k * J_inv * scale);
+      out->J_ray_px_lens[k].topRows<2>() = J_px_k;
     }
   }
 

@@ -45,8 +45,8 @@ using LensParameters = Eigen::Matrix<double, kLensSize, 1>;
 LensParameters MakePinhole(double focal_px, const Eigen::Vector2d& principal_px,
                            double aspect_ratio = 1.0);
 
-// Lens parameters to differentiate by: none, f with the principal point, all.
-enum class LensDerivatives { kNone, kPinhole, kAll };
+// Lens parameters to differentiate by: none, f with the principal point, all but kb1..kb4, all.
+enum class LensDerivatives { kNone, kPinhole, kRadTan, kAll };
 
 // A ray and its derivatives. Only the direction of `ray` has a meaning; its third component is 1.
 struct RayJet {

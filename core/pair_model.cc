@@ -55,8 +55,9 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
   if (effects.set != nullptr) {
     effects.set->ChangeObservation({px, size_px, frame}, &b->change);
     const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
-    lens_here += b->change.lens * values;
-    const Eigen::Vector3d change = b->change.time * values;
+    // Few columns: lazy products do without the set-up of large ones.
+    lens_here += b->change.lens.lazyProduct(values);
+    const Eigen::Vector3d change = b->change.time.lazyProduct(values);
     time_s += change[0];
     b->J_time_px += change.tail<2>().transpose();
   }
@@ -140,8 +141,9 @@ void Backpropagate(const Bearing& b, const RotationChain& chain, double height_p
 
   if (b.change.lens.cols() > 0) {
     if (gradient->by_effects.size() == 0) gradient->by_effects.setZero(b.change.lens.cols());
-    gradient->by_effects += by_lens * b.change.lens +
-                            Eigen::RowVector3d(by_time, by_slope.x(), by_slope.y()) * b.change.time;
+    const Eigen::RowVector3d by_times(by_time, by_slope.x(), by_slope.y());
+    gradient->by_effects += by_lens.lazyProduct(b.change.lens);
+    gradient->by_effects += by_times.lazyProduct(b.change.time);
     for (int k = 0; k < 2 && b.change.lens_slope[0].cols() > 0; ++k) {
       gradient->by_effects += (by_J_cam.col(k).transpose() * b.lens_ray.J_ray_lens) *
                               b.change.lens_slope[static_cast<size_t>(k)];

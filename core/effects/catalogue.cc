@@ -107,6 +107,21 @@ LensParameters EffectSet::ConstantLens(const LensParameters& lens,
   return sum;
 }
 
+int EffectSet::num_lens() const {
+  int number = 0;
+  for (const Item& item : items_) {
+    if (item.entry->part != ModelPart::kLens) continue;
+    if (!item.effect->is_constant_lens()) return kLensSize;  // which, may depend on where and when
+    Eigen::Matrix<double, kLensSize, Eigen::Dynamic> columns =
+        Eigen::Matrix<double, kLensSize, Eigen::Dynamic>::Zero(kLensSize, item.effect->size());
+    item.effect->ChangeLens({}, columns);
+    for (int k = number; k < kLensSize; ++k) {
+      if (!columns.row(k).isZero(0.0)) number = k + 1;
+    }
+  }
+  return number;
+}
+
 double EffectSet::widened_sigma(PairLatent latent) const {
   double sigma = 0.0;
   for (const Item& item : items_) sigma = std::max(sigma, item.effect->widened_sigma(latent));

@@ -50,6 +50,8 @@ class EffectSet {
   Eigen::Matrix3d RateByRate(const double* values) const;
   // The lens block with the effects that are a constant part of it.
   LensParameters ConstantLens(const LensParameters& lens, const Eigen::VectorXd& values) const;
+  // How many parameters of the lens, from the first on, the effects may change; 0: none.
+  int num_lens() const;
   // The widest prior of a latent that an effect asks for; 0: none does.
   double widened_sigma(PairLatent latent) const;
   // Column of the spread of the frames' own times; -1: they have none.

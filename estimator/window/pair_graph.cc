@@ -19,12 +19,11 @@ std::shared_ptr<const EffectSet> WithParameters(const Calibration& start) {
   return start.effects && start.effects->size() > 0 ? start.effects : nullptr;
 }
 
-// Whether derivatives by effects go through those by all of the lens.
-bool ChangeTheLens(const EffectSet* effects) {
-  if (effects == nullptr) return false;
-  return std::any_of(
-      effects->items().begin(), effects->items().end(),
-      [](const EffectSet::Item& item) { return item.entry->part == ModelPart::kLens; });
+// Those through which the derivatives by effects go; the other parameters of the lens are held.
+LensDerivatives DerivativesFor(const EffectSet* effects) {
+  const int number = effects == nullptr ? 0 : effects->num_lens();
+  if (number > kKb1) return LensDerivatives::kAll;
+  return number > 0 ? LensDerivatives::kRadTan : LensDerivatives::kPinhole;
 }
 
 }  // namespace
@@ -131,7 +130,7 @@ std::shared_ptr<PairMeasurement> PairGraph::Measure(const TimedPair& pair) const
   m.frame_b = pair.second();
   m.size_px << prior_mean_.width_px, prior_mean_.height_px;
   m.effects = effects_;
-  if (!ChangeTheLens(effects_.get())) m.by_lens = LensDerivatives::kPinhole;  // the others are held
+  m.by_lens = DerivativesFor(effects_.get());
   m.sigma = options_.first_sigma();
   m.noise = options_.match_noise;
   m.robust_threshold = options_.robust_threshold;

@@ -100,8 +100,9 @@ TEST(Lens, FewerDerivativesAreTheSameOnes) {
   for (const LensParameters& lens : {pinhole, EurocLens()}) {
     const Lens& model = GetLens(DistortionModel::kRadTan);
     const Eigen::Vector2d px(401.0, 77.0);
-    RayJet all, some, none;
+    RayJet all, most, some, none;
     ASSERT_TRUE(model.Unproject(px, lens, &all));
+    ASSERT_TRUE(model.Unproject(px, lens, &most, LensDerivatives::kRadTan));
     ASSERT_TRUE(model.Unproject(px, lens, &some, LensDerivatives::kPinhole));
     ASSERT_TRUE(model.Unproject(px, lens, &none, LensDerivatives::kNone));
     EXPECT_EQ(none.num_lens, 0);
@@ -110,6 +111,13 @@ TEST(Lens, FewerDerivativesAreTheSameOnes) {
     EXPECT_EQ(none.ray, all.ray);
     EXPECT_EQ(some.J_ray_px, all.J_ray_px);
     EXPECT_EQ(none.J_ray_px, all.J_ray_px);
+    ASSERT_EQ(most.num_lens, 8);
+    EXPECT_EQ(most.ray, all.ray);
+    EXPECT_EQ(most.J_ray_px, all.J_ray_px);
+    for (int k = 0; k < 8; ++k) {
+      EXPECT_EQ(most.J_ray_lens.col(k), all.J_ray_lens.col(k)) << k;
+      EXPECT_EQ(most.J_ray_px_lens[k], all.J_ray_px_lens[k]) << k;
+    }
     for (int k = 0; k < 3; ++k) {
       EXPECT_EQ(some.J_ray_lens.col(k), all.J_ray_lens.col(k)) << k;
       EXPECT_EQ(some.J_ray_px_lens[k], all.J_ray_px_lens[k]) << k;
