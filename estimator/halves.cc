@@ -7,6 +7,11 @@
 namespace camgyro {
 namespace {
 
+// A half is some 2.3 sigmas from the whole, by its noise alone (11 parameters, of which the whole
+// knows half): the directions are still the right ones, and are searched anew only where the half
+// leaves the whole by more.
+constexpr double kSettledRound = 5.0;
+
 // How the two halves of a recording disagree, in view of their covariances: chi-square per
 // parameter of the difference. 1 for a right model; what a constant model leaves out, and moves,
 // shows here.
@@ -35,6 +40,7 @@ HalvesFit::HalvesFit(const EstimationInput& input, const std::vector<TimedPair>&
 void HalvesFit::Fit(size_t half) {
   RefinementOptions options = refinement_;
   options.max_rounds = std::min(4, refinement_.max_rounds);
+  options.settled_round = kSettledRound;
   options.cluster_s = 0.5 * refinement_.cluster_s;
   options.graph.sigma = whole_.quality.noise_px;
   options.latents = whole_.latents;

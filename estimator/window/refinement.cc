@@ -116,9 +116,6 @@ bool SameScale(double before, double after) { return std::abs(after / before - 1
 // steps shrink by a factor of 1.5 to 5 each, so what is left is as much or twice as much, and that
 // of a state of 11 and more numbers.
 constexpr double kSettledStep = 0.1;
-// And of a round, with its new directions.
-constexpr double kSettledRound = 0.3;
-
 constexpr int kLeastPairs = 10;
 
 // How far two states are apart, with their effects, in sigmas: the Mahalanobis distance.
@@ -190,7 +187,7 @@ class Refinement {
       }
       // Where the next round would start from is not worth a covariance; the end is.
       const bool settled =
-          yardstick_ && yardstick_->Distance(before, result_.calibration) < kSettledRound;
+          yardstick_ && yardstick_->Distance(before, result_.calibration) < options_.settled_round;
       if (!settled && !last) continue;
       if (const Status judged = Judge(before, residuals); !judged) {
         return tl::unexpected(judged.error());
@@ -289,7 +286,8 @@ class Refinement {
     q.rms_px = scale_ * sum.rms();
     q.inlier_ratio = sum.inlier_ratio();
     result_.converged =
-        (moved.cwiseAbs().array() < kSettledRound * result_.calibration.sigma().array()).all();
+        (moved.cwiseAbs().array() < options_.settled_round * result_.calibration.sigma().array())
+            .all();
     return {};
   }
 

@@ -19,7 +19,10 @@ struct PairLatents;
 
 struct RefinementOptions {
   PairGraphOptions graph;
-  int max_rounds = 6;      // noise scale, directions and solve, until the estimate settles
+  int max_rounds = 6;  // noise scale, directions and solve, until the estimate settles
+  // It has settled when a round, with its new directions, has moved the state by less than this, in
+  // sigmas (Mahalanobis distance, and each parameter by itself).
+  double settled_round = 0.3;
   double cluster_s = 2.0;  // stretches of the clustered covariance
   // Of a fit that has settled, whose result and noise this one starts from; null: of none.
   std::shared_ptr<const PairLatents> latents;
