@@ -184,8 +184,12 @@ AddPairResult PairGraph::AddPair(const TimedPair& timed) {
   rates_.AddTo(cover, &graph_);
   if (facts.has_direction) AddDirection(timed.id, &pair);
   AddFrameTimes(timed, &pair);
-  pair.factor =
-      graph_.AddFactor(residual().MakeCost(pair.measurement, timed.id), BlocksOf(timed.id, pair));
+  std::shared_ptr<const ceres::CostFunction> cost = residual().MakeCost(pair.measurement, timed.id);
+  if (options_.remember_jacobians) {
+    pair.remembered = std::make_shared<RememberedCost>(std::move(cost));
+    cost = pair.remembered;
+  }
+  pair.factor = graph_.AddFactor(std::move(cost), BlocksOf(timed.id, pair));
   pairs_.emplace(timed.id, std::move(pair));
   if (facts.has_direction) Residuals(timed.id, /*search=*/true);
   return AddPairResult::kAdded;
@@ -312,7 +316,10 @@ Status PairGraph::MarginalizeOldest(double skew_walk_rtHz) {
 
 void PairGraph::SetSigma(int64_t id, double sigma) {
   CHECK_GT(sigma, 0.0);
-  pairs_.at(id).measurement->sigma = sigma;
+  Pair& pair = pairs_.at(id);
+  if (pair.measurement->sigma == sigma) return;
+  pair.measurement->sigma = sigma;
+  if (pair.remembered) pair.remembered->Forget();
 }
 
 std::vector<int64_t> PairGraph::pair_ids() const {

@@ -19,6 +19,7 @@
 #include "estimator/window/pair_graph_options.h"
 #include "estimator/window/pair_view.h"
 #include "estimator/window/rate_groups.h"
+#include "estimator/window/remembered_cost.h"
 #include "estimator/window/timed_pair.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/pair_bearings.h"
@@ -136,6 +137,7 @@ class PairGraph {
  private:
   struct Pair {
     std::shared_ptr<PairMeasurement> measurement;  // the factor reads its noise at every evaluation
+    std::shared_ptr<RememberedCost> remembered;    // the factor's cost, if it is one
     std::vector<int64_t> groups;
     FactorGraph::FactorKey factor = 0;
     double time_s = 0.0;

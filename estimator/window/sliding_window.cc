@@ -10,13 +10,27 @@
 
 namespace camgyro {
 
+namespace {
+
+// Pairs keep the noise that they were given while it is within this share of the present one: what
+// they have computed with it stays valid, and no sigma changes by more.
+constexpr double kSameNoise = 0.01;
+
+PairGraphOptions Remembering(PairGraphOptions options) {
+  options.remember_jacobians = true;
+  return options;
+}
+
+}  // namespace
+
 SlidingWindow::SlidingWindow(const Calibration& start, const Prior& prior, int64_t origin_ns,
                              const SlidingWindowOptions& options)
     : options_(options),
       origin_ns_(origin_ns),
-      graph_(start, prior, options.graph),
+      graph_(start, prior, Remembering(options.graph)),
       noise_scale_(options.graph.residual->facts()),
-      noise_px_(options.graph.first_sigma()) {
+      noise_px_(options.graph.first_sigma()),
+      noise_of_pairs_px_(noise_px_) {
   latest_.estimate = start;
   latest_.noise_px = noise_px_;
 }
@@ -144,11 +158,14 @@ void SlidingWindow::UpdateNoise() {
   std::vector<std::vector<double>> residuals;
   const std::vector<int64_t> ids = graph_.pair_ids();
   for (const int64_t id : ids) residuals.push_back(graph_.Residuals(id, /*search=*/false));
-  const double growth = noise_scale_.Growth(residuals, noise_px_);
+  const double here_px = noise_of_pairs_px_ * noise_scale_.Growth(residuals, noise_of_pairs_px_);
   // A settled window holds few pairs: its scale is averaged over time.
-  noise_px_ *= settled_ ? std::pow(growth, 0.1) : growth;
-  graph_.options()->sigma = noise_px_;
-  for (const int64_t id : ids) graph_.SetSigma(id, noise_px_);
+  noise_px_ *= settled_ ? std::pow(here_px / noise_px_, 0.1) : here_px / noise_px_;
+  if (!settled_ || std::abs(noise_px_ / noise_of_pairs_px_ - 1.0) > kSameNoise) {
+    noise_of_pairs_px_ = noise_px_;
+    graph_.options()->sigma = noise_px_;
+    for (const int64_t id : ids) graph_.SetSigma(id, noise_px_);
+  }
   if (graph_.has_frame_times()) UpdateFrameTimes();
 }
 

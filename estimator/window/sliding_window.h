@@ -117,7 +117,7 @@ class SlidingWindow {
   int64_t next_pair_id_ = 0;
   int num_used_ = 0, num_skipped_ = 0, num_failed_solves_ = 0;
   const NoiseScale noise_scale_;
-  double noise_px_ = 1.0;
+  double noise_px_ = 1.0, noise_of_pairs_px_ = 1.0;
   CrossFit cross_fit_;
   bool settled_ = false;
   FrameOffset newest_frame_;  // if frames have times of their own
