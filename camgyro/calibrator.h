@@ -80,6 +80,8 @@ struct Snapshot {
   std::array<ParameterState, kParameters> parameters{};
   bool ready = false;               // all of them
   std::int64_t frame_stamp_ns = 0;  // the latest frame in the estimate
+  // How fast calibration.delay_s grows there [s/s]: the clocks' rates differ by that.
+  double clock_skew = 0.0;
   // Where frames' stamps are times of arrival (kAuto), each frame has a time of its own: by how
   // much later that frame was taken than its stamp and calibration.delay_s say, with its sigma; and
   // the standard deviation of that over the frames. Else 0.

@@ -58,6 +58,7 @@ Snapshot MakeSnapshot(const OnlineCalibration::Progress& progress,
   next.stage = progress.estimating ? Stage::kEstimating : Stage::kCollecting;
   next.message = progress.message;
   next.frame_stamp_ns = progress.frame_stamp_ns;
+  next.clock_skew = progress.clock_skew;
   next.frame_offset_s = progress.frame_offset_s;
   next.frame_offset_sigma_s = progress.frame_offset_sigma_s;
   next.frame_jitter_s = progress.frame_spread_s;

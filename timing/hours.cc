@@ -2,6 +2,7 @@
 // as fast as it works. Prints a csv row per second of the stream; tools/hours.py makes
 // docs/lab/hours.md of it.
 //
+// The estimate is that for the newest frame: with the clocks' rates, from the frame that it is of.
 // The stream's tracks are simulated frame by frame and never held; gyro samples come when they
 // would, right after the exposure of the frame's last row. Seconds of the processor are those of
 // the whole process while a frame and its samples are worked on, and not of the simulator.
@@ -73,6 +74,11 @@ class Stream {
   }
 
  private:
+  static double DelayAt(const api::Snapshot& snapshot, int64_t stamp_ns) {
+    return snapshot.calibration.delay_s +
+           snapshot.clock_skew * SecondsSince(snapshot.frame_stamp_ns, stamp_ns);
+  }
+
   // The estimate as it stands when a frame has come, beside what is true of that frame.
   void Print(int64_t stamp_ns, double delay_s) {
     const auto snapshot = calibrator_->snapshot();
@@ -81,7 +87,7 @@ class Stream {
     const bool is_there = snapshot->has_estimate;
     std::printf("%.3f,%.4f,%.4f,%.4f,%.4f,%.3f,%.3f,%.2f,%d\n",
                 SecondsSince(sensors_.recording.frames.front().stamp_ns, stamp_ns), 1e3 * delay_s,
-                1e3 * (is_there ? snapshot->calibration.delay_s : nan),
+                1e3 * (is_there ? DelayAt(*snapshot, stamp_ns) : nan),
                 1e3 * (is_there ? delay.sigma : nan), 1e3 * (is_there ? delay.sigma_total : nan),
                 sum_ms_ / static_cast<double>(per_row_), most_ms_, ResidentMb(), snapshot->starts);
     std::fflush(stdout);

@@ -2,10 +2,10 @@
 """The library's Calibrator over hours of stream (timing/hours.cc) whose delay drifts. Prints the
 tables of docs/lab/hours.md and draws its figures:
 
-    tools/hours.py [--program build/release/timing/camgyro_hours] [--hours 2] [--jobs 1]
-                   [--folder FOLDER] [STREAM...]
+    tools/hours.py [--program build/release/timing/camgyro_hours] [--hours 2] [--rate 30]
+                   [--jobs 1] [--folder FOLDER] [--figures docs/lab] [STREAM...]
 
-FOLDER keeps a csv file for each stream, which is used again if it is there.
+FOLDER keeps a csv file for each stream, which is used again if it is there. Needs matplotlib.
 """
 import argparse
 import math
@@ -38,15 +38,15 @@ NEEDED_MS = 0.5
 SETTLED_S = 30.0  # errors count from then on
 
 
-def run(program, stream, hours, folder):
+def run(program, stream, hours, rate_hz, folder):
     path = "%s/%s.csv" % (folder, stream.replace(" ", "_"))
     if not os.path.exists(path):
         drift = [word % (1.0 + 600e-6 * 3600 * hours) if "%" in word else word
                  for word in STREAMS[stream]]
         with open(path + ".part", "w", encoding="utf-8") as out:
             subprocess.run([program, SOURCE + "/tools/scenarios/motion_walking.yaml",
-                            "duration_s=%g" % (3600 * hours), *COMMON, *drift], check=True,
-                           stdout=out)
+                            "duration_s=%g" % (3600 * hours), "camera.rate_hz=%g" % rate_hz, *COMMON,
+                            *drift], check=True, stdout=out)
         os.rename(path + ".part", path)
     return np.genfromtxt(path, delimiter=",", names=True)
 
@@ -131,8 +131,10 @@ def main():
     parser.add_argument("streams", nargs="*", metavar="STREAM", help=", ".join(STREAMS))
     parser.add_argument("--program", default=SOURCE + "/build/release/timing/camgyro_hours")
     parser.add_argument("--hours", type=float, default=2.0)
+    parser.add_argument("--rate", type=float, default=30.0, help="frames/s")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--folder")
+    parser.add_argument("--figures", default=SOURCE + "/docs/lab", help="empty: draws none")
     options = parser.parse_args()
     plt.rcParams.update({"font.size": 9, "svg.hashsalt": "camgyro", "path.simplify": True})
     streams = options.streams or list(STREAMS)
@@ -140,12 +142,13 @@ def main():
         folder = options.folder or temporary
         os.makedirs(folder, exist_ok=True)
         with ThreadPoolExecutor(options.jobs) as pool:
-            found = pool.map(lambda stream: run(options.program, stream, options.hours, folder),
-                             streams)
+            found = pool.map(lambda stream: run(options.program, stream, options.hours,
+                                                options.rate, folder), streams)
             results = dict(zip(streams, found))
     table(results)
-    draw_cost(results, SOURCE + "/docs/lab/hours_cost.svg")
-    draw_delay(results, SOURCE + "/docs/lab/hours_delay.svg")
+    if options.figures:
+        draw_cost(results, options.figures + "/hours_cost.svg")
+        draw_delay(results, options.figures + "/hours_delay.svg")
 
 
 if __name__ == "__main__":
