@@ -12,7 +12,8 @@
 namespace camgyro {
 namespace {
 
-#define READ_OR_SKIP(recording, name)                                         \
+// Defines `recording`.
+#define READ_OR_SKIP(name)                                                    \
   const std::optional<std::string> path = MeasuredData(name);                 \
   if (!path) GTEST_SKIP() << "*** SKIPPED: no measured recording " << (name); \
   Result<Recording> read = ReadRecording(*path);                              \
@@ -38,7 +39,7 @@ double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
 }
 
 TEST(Measured, PhoneBehindAWindscreen) {
-  READ_OR_SKIP(recording, "phone-cc9-street");
+  READ_OR_SKIP("phone-cc9-street");
   const auto report = Calibrate(&recording);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   const Calibration& c = report->calibration;
@@ -51,7 +52,7 @@ TEST(Measured, PhoneBehindAWindscreen) {
 
 // Cards on a table, hardly any pan or tilt: the halves of the recording contradict each other.
 TEST(Measured, CardsOnATable) {
-  READ_OR_SKIP(recording, "iphone-cards");
+  READ_OR_SKIP("iphone-cards");
   const auto report = Calibrate(&recording);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   const Calibration& c = report->calibration;
@@ -66,7 +67,7 @@ TEST(Measured, TabletsByTheirAttitudes) {
   for (const char* name :
        {"D01", "D02", "D03", "D04", "D05", "D06", "D07", "D08", "D10", "D11", "D12", "D13"}) {
     SCOPED_TRACE(name);
-    READ_OR_SKIP(recording, std::string("tablet-attitude/") + name);
+    READ_OR_SKIP(std::string("tablet-attitude/") + name);
     const auto report = Calibrate(&recording);
     ASSERT_TRUE(report.has_value()) << report.error().message;
     EXPECT_LT(AngleDeg(report->calibration.q_gyro_cam, Eigen::Quaterniond(axis_map)), 4.0);
@@ -76,7 +77,7 @@ TEST(Measured, TabletsByTheirAttitudes) {
 }
 
 TEST(Measured, DroneWithItsLensGiven) {
-  READ_OR_SKIP(recording, "euroc-v101-flight");
+  READ_OR_SKIP("euroc-v101-flight");
   recording.camera.aspect_ratio = 458.654 / 457.296;
   recording.camera.distortion_model = DistortionModel::kRadTan;
   recording.camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
@@ -89,7 +90,7 @@ TEST(Measured, DroneWithItsLensGiven) {
 }
 
 TEST(Measured, DroneAtRestIsRefused) {
-  READ_OR_SKIP(recording, "euroc-v101-rest");
+  READ_OR_SKIP("euroc-v101-rest");
   Result<CalibrationReport> report = Calibrate(&recording);
   const Status motion = CheckImageMotion(recording);
   EXPECT_TRUE(!report || !motion);
@@ -99,7 +100,7 @@ TEST(Measured, DroneAtRestIsRefused) {
 }
 
 TEST(Measured, StabilisedVideoIsRefused) {
-  READ_OR_SKIP(recording, "gopro-hero7-hypersmooth/hero7.mp4");
+  READ_OR_SKIP("gopro-hero7-hypersmooth/hero7.mp4");
   const auto report = Calibrate(&recording);
   ASSERT_FALSE(report.has_value());
   EXPECT_EQ(report.error().kind, ErrorKind::kCannotEstimate);
@@ -108,7 +109,7 @@ TEST(Measured, StabilisedVideoIsRefused) {
 
 // A gimbal: almost no rotation but in the last second.
 TEST(Measured, GimbalGivesTheDelayOnly) {
-  READ_OR_SKIP(recording, "gopro-hero5-karma/karma.mp4");
+  READ_OR_SKIP("gopro-hero5-karma/karma.mp4");
   const auto report = Calibrate(&recording);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   EXPECT_GT(report->start.delay_middle_row_s, -25e-3);  // -10 to -20 ms in the README
@@ -120,7 +121,7 @@ TEST(Measured, GimbalGivesTheDelayOnly) {
 
 // Simulated by a program that is not ours; the lens is given but for f, 3 % off, and c.
 TEST(Measured, HandheldRollingShutter) {
-  READ_OR_SKIP(recording, "ov_handheld_rs");
+  READ_OR_SKIP("ov_handheld_rs");
   recording.camera.aspect_ratio = 458.654 / 457.296;
   recording.camera.distortion_model = DistortionModel::kRadTan;
   recording.camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 0.00001762};
