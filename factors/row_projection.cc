@@ -20,6 +20,13 @@ using Matrix23d = Eigen::Matrix<double, 2, 3>;
 
 constexpr double kLeastDepth = 1e-6;  // of a point of unit norm
 
+// Columns of the calibration, and of the lens.
+struct PinholeState {
+  int state;
+  size_t lens;
+};
+constexpr PinholeState kPinholeStates[] = {{kStateFocal, kFocal}, {kStateCx, kCx}, {kStateCy, kCy}};
+
 enum Block { kQ, kP, kV, kGravity, kArm, kCalibration, kPoint };
 
 template <int Columns>
@@ -64,19 +71,38 @@ class RowProjection final
                          m_.ray.J_ray_lens.col(kFocal).head<2>() * calibration[kStateFocal] +
                          m_.ray.J_ray_lens.col(kCx).head<2>() * calibration[kStateCx] +
                          m_.ray.J_ray_lens.col(kCy).head<2>() * calibration[kStateCy];
+    const Eigen::Matrix2d px_per_ray = px_per_ray_ - px_per_ray_ * ScaleBy(calibration);
     Eigen::Map<Vector2d> r(residuals);
-    r = px_per_ray_ * (ray - row.seen.head<2>() / z);
+    r = px_per_ray * (ray - row.seen.head<2>() / z);
     if (jacobians == nullptr) return true;
 
     Matrix23d by_seen;
     by_seen << 1.0 / z, 0.0, -row.seen.x() / (z * z), 0.0, 1.0 / z, -row.seen.y() / (z * z);
-    by_seen = -px_per_ray_ * by_seen;
+    by_seen = -px_per_ray * by_seen;
     FillJacobians(row, Matrix23d(by_seen * R_cam_gyro), by_seen, R_row_w, turn_by_bias, dt, w, dq,
                   arm, parameters, jacobians);
+    if (jacobians[kCalibration] != nullptr) {
+      JacobianMap<kStateSize> J(jacobians[kCalibration]);
+      const Vector2d off = px_per_ray_ * (ray - row.seen.head<2>() / z);
+      for (const auto& [state, lens] : kPinholeStates) {
+        J.col(state) = px_per_ray * m_.ray.J_ray_lens.col(lens).head<2>() -
+                       px_per_ray_ * m_.ray.J_ray_px_lens[lens].topRows<2>() * m_.sigma_px * off;
+      }
+    }
     return true;
   }
 
  private:
+  // How far a ray per pixel differs from where it was linearised. Without it the residual would not
+  // be in pixels: a larger focal length would make rays, and with them the noise, smaller.
+  Eigen::Matrix2d ScaleBy(const double* calibration) const {
+    Eigen::Matrix2d change = Eigen::Matrix2d::Zero();
+    for (const auto& [state, lens] : kPinholeStates) {
+      change += calibration[state] * m_.ray.J_ray_px_lens[lens].topRows<2>();
+    }
+    return change * px_per_ray_ * m_.sigma_px;
+  }
+
   // What the residual is made of, world frame unless named otherwise.
   struct Row {
     Matrix3d R_w_node, R_node_row, R_row_shifted;
@@ -116,9 +142,6 @@ class RowProjection final
     }
     if (jacobians[kCalibration] == nullptr) return;
     JacobianMap<kStateSize> J(jacobians[kCalibration]);
-    J.col(kStateFocal) = px_per_ray_ * m_.ray.J_ray_lens.col(kFocal).head<2>();
-    J.col(kStateCx) = px_per_ray_ * m_.ray.J_ray_lens.col(kCx).head<2>();
-    J.col(kStateCy) = px_per_ray_ * m_.ray.J_ray_lens.col(kCy).head<2>();
     const Matrix23d by_turn = by_u * Hat(row.u);  // right perturbation of the gyro frame
     J.col(kStateDelay) = by_turn * m_.omega_gyro_rad_s - w * by_y * row.velocity;
     J.col(kStateReadout) = m_.row_fraction * J.col(kStateDelay);

@@ -16,8 +16,8 @@ namespace camgyro {
 //   R(t)    = R_w_k q_k_t Exp(J db_g) Exp(omega dt)                  (q_k_t: inertial, node to row)
 //   p(t)    = p_k + v_k T + g T^2 / 2 + R_w_k dp + (v_k + g T + R_w_k dv) dt
 //   s       = R_gyro_cam' R(t)' ( X - w (p(t) + R(t) p_gyro_cam) ),  R_gyro_cam = R(q) Exp(d q)
-//   r       = ( ray(pixel) - s / s_z ) in pixels / sigma_px, the ray moved by d(f, c) to first
-//   order
+//   r       = ( ray(pixel) - s / s_z ) in pixels / sigma_px; the ray, and pixels per ray, are moved
+//             by d(f, c) to first order
 //
 // Parameters  q_w_gyro 4, p_w 3 [m], v_w 3 [m/s]   of the node: a keyframe's time
 //             gravity_w 3       unit vector; times gravity_m_s2
