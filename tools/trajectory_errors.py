@@ -46,12 +46,16 @@ class Truth:
     def __init__(self, path):
         rows = np.loadtxt(path)
         # Epoch seconds leave 0.2 microseconds in a double: enough for walking.
-        self.time_s, self.p, self.R = rows[:, 0], rows[:, 1:4], quaternion_to_matrix(rows[:, 4:8])
+        self.time_s, self.p, q = rows[:, 0], rows[:, 1:4], rows[:, 4:8].copy()
+        q[1:] *= np.cumprod(np.where((q[1:] * q[:-1]).sum(-1) < 0, -1, 1))[:, None]  # no jumps
+        self.q = q
 
     def at(self, time_s):
-        p = np.stack([np.interp(time_s, self.time_s, self.p[:, i]) for i in range(3)], -1)
-        nearest = np.clip(np.searchsorted(self.time_s, time_s), 0, len(self.time_s) - 1)
-        return p, self.R[nearest]
+        """Between rows both are linear: a row of truth for every frame is enough for poses of the
+        frames, whose times are a few microseconds off."""
+        p, q = (np.stack([np.interp(time_s, self.time_s, x) for x in values.T], -1)
+                for values in (self.p, self.q))
+        return p, quaternion_to_matrix(q / np.linalg.norm(q, axis=-1, keepdims=True))
 
 
 class Poses:
