@@ -11,55 +11,119 @@ namespace camgyro {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+namespace {
+
+// Steps that differ by more are no place for a second difference: a sample lost, or stamped late.
+constexpr double kMostUnevenSteps = 2.0;
+
+// Second derivatives between samples i and i + 1: the mean of those at both; at an end, or beside
+// uneven steps, the one that there is, or zero.
+Eigen::Matrix3Xd Bends(const std::vector<double>& times_s, const Eigen::Matrix3Xd& values) {
+  const Eigen::Index n = values.cols();
+  Eigen::Matrix3Xd sums = Eigen::Matrix3Xd::Zero(3, n - 1);
+  Eigen::ArrayXd counts = Eigen::ArrayXd::Zero(n - 1);
+  for (Eigen::Index i = 1; i + 1 < n; ++i) {
+    const auto at = static_cast<size_t>(i);
+    const double before_s = times_s[at] - times_s[at - 1], after_s = times_s[at + 1] - times_s[at];
+    if (!(after_s < kMostUnevenSteps * before_s && before_s < kMostUnevenSteps * after_s)) continue;
+    const Vector3d bend = 2.0 / (before_s + after_s) *
+                          ((values.col(i + 1) - values.col(i)) / after_s -
+                           (values.col(i) - values.col(i - 1)) / before_s);
+    for (const Eigen::Index segment : {i - 1, i}) {
+      sums.col(segment) += bend;
+      counts[segment] += 1.0;
+    }
+  }
+  return sums * counts.max(1.0).inverse().matrix().asDiagonal();
+}
+
+// Where a parabola is against its chord, which spans span_s, dt_s after its beginning.
+Vector3d AboveChord(const Vector3d& bend, double dt_s, double span_s) {
+  return 0.5 * std::clamp(dt_s, 0.0, span_s) * std::min(dt_s - span_s, 0.0) * bend;
+}
+
+}  // namespace
+
 ImuIntegral::ImuIntegral(const std::vector<GyroSample>& gyro, const std::vector<AccelSample>& accel,
                          int64_t origin_ns, const Vector3d& bias_gyro_rad_s,
                          const Vector3d& bias_accel_m_s2)
     : omega_(3, static_cast<Eigen::Index>(gyro.size())),
-      force_(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(gyro.size()))) {
+      force_(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(gyro.size()))),
+      accel_(3, static_cast<Eigen::Index>(gyro.size())) {
   times_s_.reserve(gyro.size());
-  size_t next = 0;  // first accelerometer sample after the gyro's
   for (size_t i = 0; i < gyro.size(); ++i) {
     times_s_.push_back(SecondsSince(origin_ns, gyro[i].stamp_ns));
     omega_.col(i) = gyro[i].omega_gyro_rad_s - bias_gyro_rad_s;
-    if (accel.empty()) continue;
-    while (next < accel.size() && accel[next].stamp_ns <= gyro[i].stamp_ns) ++next;
-    const AccelSample& after = accel[std::min(next, accel.size() - 1)];
-    const AccelSample& before = accel[next == 0 ? 0 : next - 1];
-    const double span_s = SecondsSince(before.stamp_ns, after.stamp_ns);
-    const double weight =
-        span_s > 0.0
-            ? std::clamp(SecondsSince(before.stamp_ns, gyro[i].stamp_ns) / span_s, 0.0, 1.0)
-            : 0.0;
-    force_.col(i) =
-        (1.0 - weight) * before.accel_gyro_m_s2 + weight * after.accel_gyro_m_s2 - bias_accel_m_s2;
   }
-  states_.emplace_back();
+  omega_bend_ = Bends(times_s_, omega_);
+  if (!accel.empty()) ResampleForce(accel, origin_ns, bias_accel_m_s2);
+  states_.resize(times_s_.size());
+  accel_.col(0) = force_.col(0);
   for (size_t i = 0; i + 1 < times_s_.size(); ++i) {
-    states_.push_back(Step(states_[i], times_s_[i + 1] - times_s_[i], omega_.col(i),
-                           omega_.col(i + 1), force_.col(i), force_.col(i + 1)));
+    Turn(states_[i], i, times_s_[i + 1] - times_s_[i], &states_[i + 1]);
+    accel_.col(i + 1) = states_[i + 1].R * force_.col(i + 1);
+  }
+  accel_bend_ = Bends(times_s_, accel_);
+  for (size_t i = 0; i + 1 < times_s_.size(); ++i) {
+    Travel(states_[i], i, times_s_[i + 1] - times_s_[i], &states_[i + 1]);
   }
 }
 
-ImuIntegral::State ImuIntegral::Step(const State& from, double dt, const Vector3d& omega_from,
-                                     const Vector3d& omega_to, const Vector3d& force_from,
-                                     const Vector3d& force_to) const {
-  State to;
-  const Vector3d theta = 0.5 * dt * (omega_from + omega_to);
+// The accelerometer's samples, less its bias, at the gyro's times.
+void ImuIntegral::ResampleForce(const std::vector<AccelSample>& accel, int64_t origin_ns,
+                                const Vector3d& bias_accel_m_s2) {
+  std::vector<double> times_s;
+  Eigen::Matrix3Xd force(3, static_cast<Eigen::Index>(accel.size()));
+  for (size_t i = 0; i < accel.size(); ++i) {
+    times_s.push_back(SecondsSince(origin_ns, accel[i].stamp_ns));
+    force.col(i) = accel[i].accel_gyro_m_s2 - bias_accel_m_s2;
+  }
+  const Eigen::Matrix3Xd bends = Bends(times_s, force);
+  size_t next = 0;  // first accelerometer sample after the gyro's
+  for (size_t i = 0; i < times_s_.size(); ++i) {
+    while (next < times_s.size() && times_s[next] <= times_s_[i]) ++next;
+    if (next == 0 || next == times_s.size()) {
+      force_.col(i) = force.col(next == 0 ? 0 : next - 1);
+      continue;
+    }
+    const size_t before = next - 1;
+    const double span_s = times_s[next] - times_s[before], dt_s = times_s_[i] - times_s[before];
+    force_.col(i) = force.col(before) + dt_s / span_s * (force.col(next) - force.col(before)) +
+                    AboveChord(bends.col(before), dt_s, span_s);
+  }
+}
+
+void ImuIntegral::Turn(const State& from, size_t i, double dt_s, State* to) const {
+  const Vector3d omega_from = omega_.col(i), omega_to = RateAt(times_s_[i] + dt_s);
+  const bool inside = dt_s >= 0.0 && times_s_[i] + dt_s <= times_s_[i + 1];
+  Vector3d theta = 0.5 * dt_s * (omega_from + omega_to);
+  if (inside) {
+    // The parabola's integral, and the second term of Magnus' series.
+    theta += dt_s * dt_s / 12.0 * (omega_from.cross(omega_to) - dt_s * omega_bend_.col(i));
+  }
   const Matrix3d turn = Exp(theta).toRotationMatrix();
-  to.R = from.R * turn;
-  to.J_rot = turn.transpose() * from.J_rot - dt * RightJacobian(theta);
-  // The force is linear in the frame of reference; so are its derivatives.
-  const Vector3d a0 = from.R * force_from, a1 = to.R * force_to;
-  const Matrix3d bg0 = -from.R * Hat(force_from) * from.J_rot;
-  const Matrix3d bg1 = -to.R * Hat(force_to) * to.J_rot;
-  const double half = 0.5 * dt, third = dt * dt / 3.0, sixth = dt * dt / 6.0;
-  to.v = from.v + half * (a0 + a1);
-  to.p = from.p + dt * from.v + third * a0 + sixth * a1;
-  to.J_v_bg = from.J_v_bg + half * (bg0 + bg1);
-  to.J_p_bg = from.J_p_bg + dt * from.J_v_bg + third * bg0 + sixth * bg1;
-  to.J_v_ba = from.J_v_ba - half * (from.R + to.R);
-  to.J_p_ba = from.J_p_ba + dt * from.J_v_ba - third * from.R - sixth * to.R;
-  return to;
+  to->R = from.R * turn;
+  to->J_rot = turn.transpose() * from.J_rot - dt_s * RightJacobian(theta);
+}
+
+// The derivatives are of straight lines.
+void ImuIntegral::Travel(const State& from, size_t i, double dt_s, State* to) const {
+  const double span_s = times_s_[i + 1] - times_s_[i];
+  const bool inside = dt_s >= 0.0 && dt_s <= span_s;
+  const Vector3d bend = inside ? Vector3d(accel_bend_.col(i)) : Vector3d::Zero();
+  const double weight = std::clamp(dt_s / span_s, 0.0, 1.0);
+  const Vector3d a0 = accel_.col(i);
+  const Vector3d a1 =
+      (1.0 - weight) * a0 + weight * accel_.col(i + 1) + AboveChord(bend, dt_s, span_s);
+  const Matrix3d bg0 = -Hat(a0) * from.R * from.J_rot;
+  const Matrix3d bg1 = -Hat(a1) * to->R * to->J_rot;
+  const double half = 0.5 * dt_s, third = dt_s * dt_s / 3.0, sixth = dt_s * dt_s / 6.0;
+  to->v = from.v + half * (a0 + a1) - std::pow(dt_s, 3) / 12.0 * bend;
+  to->p = from.p + dt_s * from.v + third * a0 + sixth * a1 - std::pow(dt_s, 4) / 24.0 * bend;
+  to->J_v_bg = from.J_v_bg + half * (bg0 + bg1);
+  to->J_p_bg = from.J_p_bg + dt_s * from.J_v_bg + third * bg0 + sixth * bg1;
+  to->J_v_ba = from.J_v_ba - half * (from.R + to->R);
+  to->J_p_ba = from.J_p_ba + dt_s * from.J_v_ba - third * from.R - sixth * to->R;
 }
 
 size_t ImuIntegral::Segment(double time_s, double* weight_next) const {
@@ -73,8 +137,10 @@ size_t ImuIntegral::Segment(double time_s, double* weight_next) const {
 ImuIntegral::State ImuIntegral::At(double time_s) const {
   double weight = 0.0;
   const size_t i = Segment(time_s, &weight);
-  return Step(states_[i], time_s - times_s_[i], omega_.col(i), RateAt(time_s), force_.col(i),
-              ForceAt(time_s));
+  State state;
+  Turn(states_[i], i, time_s - times_s_[i], &state);
+  Travel(states_[i], i, time_s - times_s_[i], &state);
+  return state;
 }
 
 ImuDelta ImuIntegral::Between(double from_s, double to_s) const {
@@ -130,15 +196,16 @@ ImuIntegral::Matrix9d ImuIntegral::Covariance(double from_s, double to_s,
 Eigen::Quaterniond ImuIntegral::RotationAt(double time_s) const {
   double weight = 0.0;
   const size_t i = Segment(time_s, &weight);
-  const Vector3d omega = 0.5 * (omega_.col(i) + RateAt(time_s));
-  return (Eigen::Quaterniond(states_[i].R) * Exp(Vector3d(omega * (time_s - times_s_[i]))))
-      .normalized();
+  State state;
+  Turn(states_[i], i, time_s - times_s_[i], &state);
+  return Eigen::Quaterniond(state.R).normalized();
 }
 
 Vector3d ImuIntegral::RateAt(double time_s) const {
   double weight = 0.0;
   const size_t i = Segment(time_s, &weight);
-  return (1.0 - weight) * omega_.col(i) + weight * omega_.col(i + 1);
+  return (1.0 - weight) * omega_.col(i) + weight * omega_.col(i + 1) +
+         AboveChord(omega_bend_.col(i), time_s - times_s_[i], times_s_[i + 1] - times_s_[i]);
 }
 
 Vector3d ImuIntegral::ForceAt(double time_s) const {

@@ -36,8 +36,9 @@ struct ImuDelta {
 };
 
 // Integrals of the samples of both sensors over one stretch of time, as prefix sums: one Between
-// costs the same however long it is. Rate and specific force (in the frame of reference) are linear
-// between gyro samples: at 200 Hz and 4 Hz of motion this errs by 1e-3 of what swings at 4 Hz.
+// costs the same however long it is. Between gyro samples, rate and specific force (in the frame of
+// reference) are parabolas, bent as their neighbours say: straight lines would take 1.3e-3 away of
+// what swings at 4 Hz with samples at 200 Hz, which an estimator then finds in the focal length.
 // Without accelerometer samples dv and dp are zero. Outside of the samples the last ones are held.
 class ImuIntegral {
  public:
@@ -68,14 +69,19 @@ class ImuIntegral {
     Eigen::Matrix3d J_v_bg = Eigen::Matrix3d::Zero(), J_v_ba = Eigen::Matrix3d::Zero();
     Eigen::Matrix3d J_p_bg = Eigen::Matrix3d::Zero(), J_p_ba = Eigen::Matrix3d::Zero();
   };
-  State Step(const State& from, double dt, const Eigen::Vector3d& omega_from,
-             const Eigen::Vector3d& omega_to, const Eigen::Vector3d& force_from,
-             const Eigen::Vector3d& force_to) const;
+  void ResampleForce(const std::vector<AccelSample>& accel, int64_t origin_ns,
+                     const Eigen::Vector3d& bias_accel_m_s2);
+  // From sample i on by dt_s: rotation, then velocity and position.
+  void Turn(const State& from, size_t i, double dt_s, State* to) const;
+  void Travel(const State& from, size_t i, double dt_s, State* to) const;
   State At(double time_s) const;
   size_t Segment(double time_s, double* weight_next) const;
 
   std::vector<double> times_s_;  // of the gyro samples
-  Eigen::Matrix3Xd omega_, force_;
+  // At the gyro samples; accel_: the force in the frame of reference. Second derivatives: of the
+  // stretch from each sample to the next.
+  Eigen::Matrix3Xd omega_, force_, accel_;
+  Eigen::Matrix3Xd omega_bend_, accel_bend_;
   std::vector<State> states_;
 };
 
