@@ -11,17 +11,22 @@ namespace camgyro {
 
 //   r = S * [ x_1 [-] x_1,lin; x_2 [-] x_2,lin; ... ] + r_0
 //
-// Parameters  the blocks that stay, in the order given; a rotation block (4, [x y z w]) enters by
-//             its tangent, the others by their difference
+// Parameters  the blocks that stay, in the order given; a rotation (4, [x y z w]) enters by its
+//             tangent, a homogeneous point (4, unit norm) by x / (x . x_lin) in the tangent of
+//             ceres::SphereManifold at x_lin, the others by their difference
 // Residual    rows of S, in sigmas
 // Source      square-root form of the Schur complement; see estimator/window/marginalize.h.
-//             The derivative of [-] includes the inverse right Jacobian
+//             The derivative of [-] includes the inverse right Jacobian. Cannot be evaluated for
+//             a point at 90 deg or more from x_lin
 class MarginalPrior final : public ceres::CostFunction {
  public:
+  enum class Kind { kVector, kRotation, kHomogeneousPoint };
   struct Block {
     Eigen::VectorXd linearization;  // ambient values
-    bool is_rotation = false;
-    int tangent_size() const { return is_rotation ? 3 : static_cast<int>(linearization.size()); }
+    Kind kind = Kind::kVector;
+    int tangent_size() const {
+      return kind == Kind::kVector ? static_cast<int>(linearization.size()) : 3;
+    }
   };
 
   // sqrt_information: rows x sum of tangent sizes; offset: rows.

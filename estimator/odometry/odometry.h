@@ -25,7 +25,8 @@
 namespace camgyro {
 
 struct OdometryOptions {
-  int keyframes = 16;  // in the window
+  int keyframes = 16;       // in the window
+  int kept_landmarks = 80;  // at most, that stay known after the window has left them behind
   // A frame becomes a keyframe when this long has passed since the last one, or earlier, once
   // tracked points have moved against each other by this angle or many of them were lost.
   double keyframe_interval_s = 0.3;

@@ -153,6 +153,7 @@ Status Odometry::Begin(const VinsStart& start) {
 
   OdometryWindowOptions options;
   options.gravity_m_s2 = options_.gravity_m_s2;
+  options.kept_landmarks = options_.kept_landmarks;
   options.walk = options_.walk;
   auto window = std::make_unique<OdometryWindow>(calibration_, options);
   noise_px_ = start.noise_px;

@@ -1,6 +1,7 @@
 #include "estimator/odometry/odometry_window.h"
 
 #include <ceres/solver.h>
+#include <ceres/sphere_manifold.h>
 #include <glog/logging.h>
 
 #include <Eigen/Cholesky>
@@ -25,6 +26,10 @@ using Eigen::VectorXd;
 constexpr double kMinParallaxRad = 0.01;
 // Of a direction from a point that is triangulated with states as they were predicted.
 constexpr double kMaxTriangulationErrorRad = 0.02;
+// What the prior says of a landmark is linearised where the landmark is believed to be when its
+// first keyframe leaves. With less than this from there to the newest keyframe, that is not well
+// enough known: sigmas of the way become too small (docs/lab/odometry.md).
+constexpr double kMinKeptParallaxRad = 0.3;
 constexpr double kOutlierSigmas = 4.0;
 constexpr double kLeastNoisePx = 1e-3;
 // Of each solve's estimate of the noise in what later sightings are weighted with.
@@ -51,6 +56,22 @@ MatrixXd InverseRoot(const MatrixXd& covariance) {
   return root * scale.asDiagonal();
 }
 
+// Counts a homogeneous point from an origin that has moved; returns the derivative of its tangent's
+// coordinates.
+Matrix3d MoveOrigin(const Vector3d& shift_m, VectorXd* point) {
+  const ceres::SphereManifold<4> sphere;
+  Eigen::Matrix4d move = Eigen::Matrix4d::Identity();
+  move.topRightCorner<3, 1>() = -shift_m;
+  Eigen::Matrix<double, 4, 3, Eigen::RowMajor> from;
+  Eigen::Matrix<double, 3, 4, Eigen::RowMajor> to;
+  sphere.PlusJacobian(point->data(), from.data());
+  *point = move * *point;
+  const double length = point->norm();
+  *point /= length;
+  sphere.MinusJacobian(point->data(), to.data());
+  return to * move * from / length;
+}
+
 }  // namespace
 
 OdometryWindow::OdometryWindow(const Calibration& calibration, const OdometryWindowOptions& options)
@@ -58,15 +79,12 @@ OdometryWindow::OdometryWindow(const Calibration& calibration, const OdometryWin
 
 OdometryWindow::~OdometryWindow() = default;
 
-void OdometryWindow::SetPrior(std::vector<double*> blocks, MatrixXd S, VectorXd r) {
+void OdometryWindow::SetPrior(std::vector<PriorBlock> blocks, const SquareRoot& root) {
   std::vector<MarginalPrior::Block> linearised;
-  for (double* block : blocks) {
-    const bool is_rotation = std::any_of(keyframes_.begin(), keyframes_.end(),
-                                         [&](OdometryNode& k) { return k.q() == block; });
-    const int size = is_rotation ? 4 : block == calibration_.data() ? int{kStateSize} : 3;
-    linearised.push_back({Eigen::Map<VectorXd>(block, size), is_rotation});
+  for (const PriorBlock& block : blocks) {
+    linearised.push_back({Eigen::Map<VectorXd>(block.values, block.size), block.kind});
   }
-  prior_ = std::make_unique<MarginalPrior>(std::move(linearised), std::move(S), std::move(r));
+  prior_ = std::make_unique<MarginalPrior>(std::move(linearised), root.S, root.r);
   prior_blocks_ = std::move(blocks);
 }
 
@@ -96,9 +114,13 @@ void OdometryWindow::AddFirst(NewKeyframe keyframe, const WindowPrior& prior) {
   S.bottomRightCorner<3, 3>() = Matrix3d::Identity() / prior.p_gyro_cam_sigma_m;
   VectorXd r = VectorXd::Zero(S.rows());
   r.segment<3>(7) = first.state.bias_accel_m_s2 / prior.bias_accel_sigma_m_s2;
-  SetPrior({first.q(), first.p(), first.bias_gyro(), first.bias_accel(), calibration_.data(),
-            arm_.data()},
-           std::move(S), std::move(r));
+  SetPrior({{first.q(), 4, MarginalPrior::Kind::kRotation},
+            {first.p()},
+            {first.bias_gyro()},
+            {first.bias_accel()},
+            {calibration_.data(), kStateSize},
+            {arm_.data()}},
+           {std::move(S), std::move(r)});
   AddSightings(&keyframe);
 }
 
@@ -132,7 +154,8 @@ void OdometryWindow::RemoveNewest() {
   for (auto it = landmarks_.begin(); it != landmarks_.end();) {
     std::vector<OdometrySighting>& sightings = it->second.sightings;
     if (!sightings.empty() && sightings.back().keyframe == newest) sightings.pop_back();
-    it = sightings.empty() ? landmarks_.erase(it) : std::next(it);
+    const bool gone = sightings.empty() && !it->second.in_prior;
+    it = gone ? landmarks_.erase(it) : std::next(it);
   }
   keyframes_.pop_back();
 }
@@ -202,7 +225,7 @@ void OdometryWindow::DropOutliersAndUpdateNoise(const Program& program) {
   int newest = 0, newest_inliers = 0, points = 0;
   for (auto& [track_id, landmark] : landmarks_) {
     if (!landmark.used()) continue;
-    ++points;
+    points += !landmark.in_prior;
     const auto& ids = program.SightingsOf(track_id);
     std::vector<OdometrySighting> kept;
     for (size_t i = 0; i < ids.size(); ++i) {
@@ -223,7 +246,8 @@ void OdometryWindow::DropOutliersAndUpdateNoise(const Program& program) {
   known_sightings_ = newest;
   inlier_ratio_ = newest > 0 ? static_cast<double>(newest_inliers) / newest : 0.0;
   if (norms_px.size() < kMinResidualsForNoise) return;
-  // A landmark takes 3 of its residuals' degrees of freedom, a keyframe about 6.
+  // A landmark that only the window knows takes 3 of its residuals' degrees of freedom, a keyframe
+  // about 6.
   const double all = 2.0 * static_cast<double>(norms_px.size());
   const double taken = 3.0 * points + 6.0 * static_cast<double>(keyframes_.size());
   // The median length of a unit normal vector in the plane is 1.177.
@@ -232,27 +256,75 @@ void OdometryWindow::DropOutliersAndUpdateNoise(const Program& program) {
   noise_px_ = std::max(kLeastNoisePx, (1.0 - kNoiseUpdate) * noise_px_ + kNoiseUpdate * found_px);
 }
 
+double OdometryWindow::ParallaxRad(const OdometrySighting& a, const OdometrySighting& b) const {
+  const Vector3d from = LineOf(a).direction, to = LineOf(b).direction;
+  return std::atan2(from.cross(to).norm(), from.dot(to));
+}
+
+// Landmarks that have been seen longest come first.
+void OdometryWindow::ChooseKept() {
+  size_t kept = 0;
+  std::vector<OdometryLandmark*> candidates;
+  for (auto& [track_id, landmark] : landmarks_) {
+    kept += landmark.in_prior;
+    if (landmark.in_prior || !landmark.used()) continue;
+    if (landmark.sightings.front().keyframe == &keyframes_.front() &&
+        landmark.sightings.back().keyframe == &keyframes_.back() &&
+        ParallaxRad(landmark.sightings.front(), landmark.sightings.back()) > kMinKeptParallaxRad) {
+      candidates.push_back(&landmark);
+    }
+  }
+  std::stable_sort(candidates.begin(), candidates.end(), [](const auto* a, const auto* b) {
+    return a->sightings.size() > b->sightings.size();
+  });
+  for (OdometryLandmark* candidate : candidates) {
+    if (kept++ >= static_cast<size_t>(options_.kept_landmarks)) return;
+    candidate->in_prior = true;
+  }
+}
+
 Result<WindowKeyframe> OdometryWindow::MarginaliseOldest() {
   CHECK_GT(keyframes_.size(), 2u);
   const WindowKeyframe leaving = keyframe(0);
   OdometryNode& oldest = keyframes_.front();
   const int64_t half_ns = keyframes_[keyframes_.size() / 2].time_ns;
+  const auto older_than_half = [&](const OdometryLandmark& landmark) {
+    const auto newer =
+        std::find_if(landmark.sightings.begin(), landmark.sightings.end(),
+                     [&](const OdometrySighting& s) { return s.keyframe->time_ns >= half_ns; });
+    return static_cast<size_t>(newer - landmark.sightings.begin());
+  };
 
+  Program program(this);
+  ChooseKept();
   ReducedInformation information;
   Program::AddKeyframe(&oldest, &information);
+  std::vector<PriorBlock> staying;
+  std::vector<PriorBlock> kept_points;
+  for (auto& [track_id, landmark] : landmarks_) {
+    if (!landmark.in_prior) continue;
+    if (older_than_half(landmark) == landmark.sightings.size()) {
+      information.AddBlock(landmark.point.data(), 3);
+    } else {
+      kept_points.push_back({landmark.point.data(), 4, MarginalPrior::Kind::kHomogeneousPoint});
+    }
+  }
   const int leading = information.size();
-  Program program(this);
-  std::vector<double*> staying;
   for (size_t k = 1; k <= keyframes_.size() / 2; ++k) {
     OdometryNode& other = keyframes_[k];
     Program::AddKeyframe(&other, &information);
-    for (double* block : {other.q(), other.p(), other.v(), other.bias_gyro(), other.bias_accel()}) {
-      staying.push_back(block);
+    staying.push_back({other.q(), 4, MarginalPrior::Kind::kRotation});
+    for (double* block : {other.p(), other.v(), other.bias_gyro(), other.bias_accel()}) {
+      staying.push_back({block});
     }
   }
   program.AddShared(&information);
-  staying.push_back(calibration_.data());
-  staying.push_back(arm_.data());
+  staying.push_back({calibration_.data(), kStateSize});
+  staying.push_back({arm_.data()});
+  for (const PriorBlock& point : kept_points) {
+    information.AddBlock(point.values, 3);
+    staying.push_back(point);
+  }
 
   const tl::unexpected<Error> failed = CannotEstimate("a keyframe cannot be marginalised");
   if (!information.Add(program.problem(), program.prior())) return failed;
@@ -261,27 +333,47 @@ Result<WindowKeyframe> OdometryWindow::MarginaliseOldest() {
   }
   for (auto it = landmarks_.begin(); it != landmarks_.end();) {
     OdometryLandmark& landmark = it->second;
-    if (!landmark.sightings.empty() && landmark.sightings.front().keyframe == &oldest) {
-      const auto newer =
-          std::find_if(landmark.sightings.begin(), landmark.sightings.end(),
-                       [&](const OdometrySighting& s) { return s.keyframe->time_ns >= half_ns; });
-      const auto older = static_cast<size_t>(newer - landmark.sightings.begin());
-      if (landmark.used() && older >= 2) {
+    const bool seen = !landmark.sightings.empty() && landmark.sightings.front().keyframe == &oldest;
+    size_t leave = 0;  // so many of its sightings
+    if (landmark.in_prior) {
+      const size_t older = older_than_half(landmark);
+      const bool ends = older == landmark.sightings.size();
+      leave = ends ? older : seen;
+      const std::vector<ceres::ResidualBlockId>& ids = program.SightingsOf(it->first);
+      for (size_t i = 0; i < leave; ++i) {
+        if (!information.Add(program.problem(), ids[i])) return failed;
+      }
+    } else if (seen) {
+      leave = 1;  // One sighting of a point that has to be found by it as well says nothing.
+      if (const size_t older = older_than_half(landmark); landmark.used() && older >= 2) {
+        leave = older;
         std::vector<ceres::ResidualBlockId> ids = program.SightingsOf(it->first);
         ids.resize(older);
         if (!information.AddWithout(program.problem(), ids, landmark.point.data(), 3)) {
           return failed;
         }
-        landmark.sightings.erase(landmark.sightings.begin(), newer);
-      } else {  // One sighting of a point that has to be found by it as well says nothing.
-        landmark.sightings.erase(landmark.sightings.begin());
       }
-      if (landmark.sightings.size() < 2) landmark.point.setZero();
+      if (landmark.sightings.size() - leave < 2) landmark.point.setZero();
     }
+    landmark.sightings.erase(landmark.sightings.begin(),
+                             landmark.sightings.begin() + static_cast<std::ptrdiff_t>(leave));
     it = landmark.sightings.empty() ? landmarks_.erase(it) : std::next(it);
   }
-  const SquareRoot root = RootOf(information.Without(leading));
-  SetPrior(std::move(staying), root.S, root.r);
+  const Quadratic left = information.Without(leading);
+  // Biases of keyframes further on, which nothing has spoken of yet, are no part of the prior.
+  std::vector<PriorBlock> known;
+  std::vector<Eigen::Index> columns;
+  Eigen::Index column = 0;
+  for (const PriorBlock& block : staying) {
+    const Eigen::Index size = block.kind == MarginalPrior::Kind::kVector ? block.size : 3;
+    if (!left.g.segment(column, size).isZero(0.0) ||
+        !left.H.diagonal().segment(column, size).isZero(0.0)) {
+      known.push_back(block);
+      for (Eigen::Index i = 0; i < size; ++i) columns.push_back(column + i);
+    }
+    column += size;
+  }
+  SetPrior(std::move(known), RootOf({left.H(columns, columns), left.g(columns)}));
   keyframes_.pop_front();
   OdometryNode& first = keyframes_.front();
   first.inertial.reset();
@@ -297,17 +389,24 @@ void OdometryWindow::Recentre() {
   origin_m_ += shift_m;
   for (auto& [track_id, landmark] : landmarks_) {
     if (!landmark.known()) continue;
-    landmark.point.head<3>() -= landmark.point[3] * shift_m;
-    landmark.point.normalize();
+    VectorXd point = landmark.point;
+    MoveOrigin(shift_m, &point);
+    landmark.point = point;
   }
   std::vector<MarginalPrior::Block> blocks = prior_->blocks();
+  MatrixXd S = prior_->sqrt_information();
+  Eigen::Index column = 0;
   for (size_t i = 0; i < blocks.size(); ++i) {
+    const double* values = prior_blocks_[i].values;
     const bool position = std::any_of(keyframes_.begin(), keyframes_.end(),
-                                      [&](OdometryNode& k) { return k.p() == prior_blocks_[i]; });
+                                      [&](OdometryNode& k) { return k.p() == values; });
     if (position) blocks[i].linearization -= shift_m;
+    if (blocks[i].kind == MarginalPrior::Kind::kHomogeneousPoint) {
+      S.middleCols<3>(column) *= MoveOrigin(shift_m, &blocks[i].linearization).inverse();
+    }
+    column += blocks[i].tangent_size();
   }
-  prior_ = std::make_unique<MarginalPrior>(std::move(blocks), prior_->sqrt_information(),
-                                           prior_->offset());
+  prior_ = std::make_unique<MarginalPrior>(std::move(blocks), std::move(S), prior_->offset());
   for (OdometryNode& k : keyframes_) k.state.p_world_m -= shift_m;
 }
 
@@ -338,6 +437,9 @@ Result<OdometryWindow::Covariance> OdometryWindow::ComputeCovariance(bool of_all
   ReducedInformation information;
   for (OdometryNode& k : keyframes_) Program::AddKeyframe(&k, &information);
   program.AddShared(&information);
+  for (auto& [track_id, landmark] : landmarks_) {
+    if (landmark.in_prior) information.AddBlock(landmark.point.data(), 3);
+  }
   bool sound = information.Add(program.problem(), program.prior());
   for (size_t k = 1; k < keyframes_.size(); ++k) {
     for (const ceres::ResidualBlockId id : program.LinksOf(k)) {
@@ -346,6 +448,12 @@ Result<OdometryWindow::Covariance> OdometryWindow::ComputeCovariance(bool of_all
   }
   for (auto& [track_id, landmark] : landmarks_) {
     if (!sound || !landmark.used()) continue;
+    if (landmark.in_prior) {
+      for (const ceres::ResidualBlockId id : program.SightingsOf(track_id)) {
+        sound = sound && information.Add(program.problem(), id);
+      }
+      continue;
+    }
     sound = information.AddWithout(program.problem(), program.SightingsOf(track_id),
                                    landmark.point.data(), 3);
   }

@@ -14,6 +14,7 @@
 #include "core/calibration.h"
 #include "core/result.h"
 #include "estimator/odometry/navigation_state.h"
+#include "estimator/odometry/reduced_information.h"
 #include "estimator/odometry/triangulation.h"
 #include "estimator/odometry/window_parts.h"
 #include "factors/marginal_prior.h"
@@ -23,6 +24,8 @@
 namespace camgyro {
 
 struct OdometryWindowOptions {
+  // Landmarks that stay in the prior while their tracks last, at most; 0: all are split.
+  int kept_landmarks = 80;
   double gravity_m_s2 = 9.80665;
   BiasWalkDensity walk;
 };
@@ -83,9 +86,11 @@ class OdometryWindow {
   Status Solve(int max_iterations);
 
   // The oldest of at least three keyframes leaves: what its factors say becomes part of the prior.
-  // A landmark that it sees is split: what the older half of the window saw of it goes with it,
-  // what the newer half saw of it stays, so that nothing is used twice. Returns the keyframe as it
-  // was last estimated. Error: kCannotEstimate.
+  // Landmarks that it and the newest keyframe see, from directions that differ by 0.3 rad, are
+  // kept, up to kept_landmarks: the prior speaks of them, until the newer half of the window does
+  // not see them any more. Any other landmark that it sees is split: what the older half of the
+  // window saw of it goes with it, what the newer half saw of it stays, so that nothing is used
+  // twice. Returns the keyframe as it was last estimated. Error: kCannotEstimate.
   Result<WindowKeyframe> MarginaliseOldest();
 
   size_t size() const { return keyframes_.size(); }
@@ -115,12 +120,19 @@ class OdometryWindow {
  private:
   class Program;
 
-  void SetPrior(std::vector<double*> blocks, Eigen::MatrixXd S, Eigen::VectorXd r);
+  struct PriorBlock {
+    double* values = nullptr;
+    int size = 3;
+    MarginalPrior::Kind kind = MarginalPrior::Kind::kVector;
+  };
+  void SetPrior(std::vector<PriorBlock> blocks, const SquareRoot& root);
   void AddSightings(NewKeyframe* keyframe);
   ViewingLine LineOf(const OdometrySighting& sighting) const;
   bool Believable(const OdometryLandmark& landmark, const OdometrySighting& sighting) const;
   void DropUnbelievable(OdometryLandmark* landmark) const;
   void TriangulateNew();
+  double ParallaxRad(const OdometrySighting& a, const OdometrySighting& b) const;
+  void ChooseKept();
   void DropOutliersAndUpdateNoise(const Program& program);
   void Recentre();
 
@@ -135,7 +147,7 @@ class OdometryWindow {
   Eigen::Vector3d arm_ = Eigen::Vector3d::Zero();
   StateVector calibration_ = StateVector::Zero();
   std::unique_ptr<MarginalPrior> prior_;
-  std::vector<double*> prior_blocks_;
+  std::vector<PriorBlock> prior_blocks_;
   double noise_px_ = 1.0;
   double inlier_ratio_ = 1.0;
   int known_sightings_ = 0;

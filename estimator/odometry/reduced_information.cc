@@ -90,17 +90,33 @@ bool ReducedInformation::Add(const ceres::Problem& problem, ceres::ResidualBlock
   Grow();
   Linearised l;
   if (!Linearise(problem, id, &l)) return false;
-  for (size_t a = 0; a < l.blocks.size(); ++a) {
-    const auto row = columns_.find(l.blocks[a]);
-    if (row == columns_.end()) continue;
-    const auto [first_a, size_a] = row->second;
-    sum_.g.segment(first_a, size_a) += l.parts[a].transpose() * l.residual;
-    for (size_t b = 0; b < l.blocks.size(); ++b) {
-      const auto column = columns_.find(l.blocks[b]);
-      if (column == columns_.end()) continue;
-      sum_.H.block(first_a, column->second.first, size_a, column->second.second) +=
-          l.parts[a].transpose() * l.parts[b];
+  // The parts side by side, so that a prior of a hundred blocks is one product and not thousands.
+  std::vector<std::pair<int, int>> columns;  // of sum_
+  int size = 0;
+  for (const double* block : l.blocks) {
+    const auto known = columns_.find(block);
+    columns.push_back(known == columns_.end() ? std::make_pair(0, 0) : known->second);
+    size += columns.back().second;
+  }
+  MatrixXd J(l.residual.size(), size);
+  for (size_t a = 0, at = 0; a < columns.size(); at += static_cast<size_t>(columns[a++].second)) {
+    if (columns[a].second > 0) {
+      J.middleCols(static_cast<Eigen::Index>(at), columns[a].second) = l.parts[a];
     }
+  }
+  MatrixXd JtJ = MatrixXd::Zero(size, size);
+  JtJ.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
+  JtJ.triangularView<Eigen::StrictlyUpper>() = JtJ.transpose();
+  const VectorXd Jtr = J.transpose() * l.residual;
+  Eigen::Index row = 0;
+  for (const auto& [first_a, size_a] : columns) {
+    sum_.g.segment(first_a, size_a) += Jtr.segment(row, size_a);
+    Eigen::Index column = 0;
+    for (const auto& [first_b, size_b] : columns) {
+      sum_.H.block(first_a, first_b, size_a, size_b) += JtJ.block(row, column, size_a, size_b);
+      column += size_b;
+    }
+    row += size_a;
   }
   return true;
 }

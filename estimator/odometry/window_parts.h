@@ -39,9 +39,11 @@ struct OdometryLandmark {
   // Homogeneous, unit norm, as RowProjection takes it, from origin_m_; all zero: not known yet.
   Eigen::Vector4d point = Eigen::Vector4d::Zero();
   std::vector<OdometrySighting> sightings;  // by keyframe
+  // The prior speaks of it: keyframes that have left the window saw it.
+  bool in_prior = false;
 
   bool known() const { return !point.isZero(); }
-  bool used() const { return known() && sightings.size() >= 2; }
+  bool used() const { return known() && (in_prior || sightings.size() >= 2); }
 };
 
 }  // namespace camgyro

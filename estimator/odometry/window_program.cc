@@ -34,7 +34,13 @@ OdometryWindow::Program::Program(OdometryWindow* window)
   problem_.SetParameterBlockConstant(window->gravity_.data());
   problem_.AddParameterBlock(window->arm_.data(), 3);
   problem_.AddParameterBlock(window->calibration_.data(), kStateSize);
-  prior_ = problem_.AddResidualBlock(window->prior_.get(), nullptr, window->prior_blocks_);
+  for (auto& [track_id, landmark] : window->landmarks_) {
+    if (!landmark.used()) continue;
+    problem_.AddParameterBlock(landmark.point.data(), 4, point_manifold_.get());
+  }
+  std::vector<double*> prior_blocks;
+  for (const PriorBlock& block : window->prior_blocks_) prior_blocks.push_back(block.values);
+  prior_ = problem_.AddResidualBlock(window->prior_.get(), nullptr, prior_blocks);
   links_.resize(window->keyframes_.size());
   for (size_t n = 1; n < window->keyframes_.size(); ++n) {
     OdometryNode &i = window->keyframes_[n - 1], &j = window->keyframes_[n];
@@ -46,7 +52,6 @@ OdometryWindow::Program::Program(OdometryWindow* window)
   }
   for (auto& [track_id, landmark] : window->landmarks_) {
     if (!landmark.used()) continue;
-    problem_.AddParameterBlock(landmark.point.data(), 4, point_manifold_.get());
     std::vector<ceres::ResidualBlockId>& ids = sightings_[track_id];
     for (const OdometrySighting& s : landmark.sightings) {
       ids.push_back(problem_.AddResidualBlock(s.factor.get(), loss_.get(), s.keyframe->q(),

@@ -294,7 +294,9 @@ Result<int> FactorGraph::Marginalize(const std::vector<BlockId>& leaving,
     if (!staying.empty() && elimination.offset.size() > 0) {
       std::vector<MarginalPrior::Block> prior_blocks;
       for (const BlockId& id : staying) {
-        prior_blocks.push_back({value(id), block(id).geometry == Geometry::kRotation});
+        prior_blocks.push_back({value(id), block(id).geometry == Geometry::kRotation
+                                               ? MarginalPrior::Kind::kRotation
+                                               : MarginalPrior::Kind::kVector});
       }
       AddFactor(std::make_shared<MarginalPrior>(std::move(prior_blocks),
                                                 std::move(elimination.sqrt_information),

@@ -263,9 +263,9 @@ FactorGraph RotationProblem(int groups) {
   graph.AddBlock(Bias(0), Euclidean(Vector3d::Zero()));
   graph.AddFactor(
       std::make_shared<MarginalPrior>(
-          std::vector<MarginalPrior::Block>{{Eigen::Vector2d::Zero(), false},
-                                            {q_gyro_cam.coeffs(), true},
-                                            {Vector3d::Zero(), false}},
+          std::vector<MarginalPrior::Block>{{Eigen::Vector2d::Zero()},
+                                            {q_gyro_cam.coeffs(), MarginalPrior::Kind::kRotation},
+                                            {Vector3d::Zero()}},
           MatrixXd((VectorXd(8) << 100, 1000, 5, 5, 5, 10, 10, 10).finished().asDiagonal()),
           VectorXd::Zero(8)),
       {Shutter(), Rotation(), Bias(0)});
