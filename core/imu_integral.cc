@@ -95,7 +95,7 @@ void ImuIntegral::ResampleForce(const std::vector<AccelSample>& accel, int64_t o
 
 void ImuIntegral::Turn(const State& from, size_t i, double dt_s, State* to) const {
   const Vector3d omega_from = omega_.col(i), omega_to = RateAt(times_s_[i] + dt_s);
-  const bool inside = dt_s >= 0.0 && times_s_[i] + dt_s <= times_s_[i + 1];
+  const bool inside = dt_s >= 0.0 && dt_s <= times_s_[i + 1] - times_s_[i];
   Vector3d theta = 0.5 * dt_s * (omega_from + omega_to);
   if (inside) {
     // The parabola's integral, and the second term of Magnus' series.

@@ -99,10 +99,10 @@ bool ReducedInformation::Add(const ceres::Problem& problem, ceres::ResidualBlock
     size += columns.back().second;
   }
   MatrixXd J(l.residual.size(), size);
-  for (size_t a = 0, at = 0; a < columns.size(); at += static_cast<size_t>(columns[a++].second)) {
-    if (columns[a].second > 0) {
-      J.middleCols(static_cast<Eigen::Index>(at), columns[a].second) = l.parts[a];
-    }
+  Eigen::Index at = 0;
+  for (size_t a = 0; a < columns.size(); ++a) {
+    if (columns[a].second > 0) J.middleCols(at, columns[a].second) = l.parts[a];
+    at += columns[a].second;
   }
   MatrixXd JtJ = MatrixXd::Zero(size, size);
   JtJ.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
