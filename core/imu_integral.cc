@@ -9,6 +9,7 @@
 namespace camgyro {
 
 using Eigen::Matrix3d;
+using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
 namespace {
@@ -18,17 +19,17 @@ constexpr double kMostUnevenSteps = 2.0;
 
 // Second derivatives between samples i and i + 1: the mean of those at both; at an end, or beside
 // uneven steps, the one that there is, or zero.
-Eigen::Matrix3Xd Bends(const std::vector<double>& times_s, const Eigen::Matrix3Xd& values) {
+MatrixXd Bends(const std::vector<double>& times_s, const MatrixXd& values) {
   const Eigen::Index n = values.cols();
-  Eigen::Matrix3Xd sums = Eigen::Matrix3Xd::Zero(3, n - 1);
+  MatrixXd sums = MatrixXd::Zero(values.rows(), n - 1);
   Eigen::ArrayXd counts = Eigen::ArrayXd::Zero(n - 1);
   for (Eigen::Index i = 1; i + 1 < n; ++i) {
     const auto at = static_cast<size_t>(i);
     const double before_s = times_s[at] - times_s[at - 1], after_s = times_s[at + 1] - times_s[at];
     if (!(after_s < kMostUnevenSteps * before_s && before_s < kMostUnevenSteps * after_s)) continue;
-    const Vector3d bend = 2.0 / (before_s + after_s) *
-                          ((values.col(i + 1) - values.col(i)) / after_s -
-                           (values.col(i) - values.col(i - 1)) / before_s);
+    const Eigen::VectorXd bend = 2.0 / (before_s + after_s) *
+                                 ((values.col(i + 1) - values.col(i)) / after_s -
+                                  (values.col(i) - values.col(i - 1)) / before_s);
     for (const Eigen::Index segment : {i - 1, i}) {
       sums.col(segment) += bend;
       counts[segment] += 1.0;
@@ -37,9 +38,9 @@ Eigen::Matrix3Xd Bends(const std::vector<double>& times_s, const Eigen::Matrix3X
   return sums * counts.max(1.0).inverse().matrix().asDiagonal();
 }
 
-// Where a parabola is against its chord, which spans span_s, dt_s after its beginning.
-Vector3d AboveChord(const Vector3d& bend, double dt_s, double span_s) {
-  return 0.5 * std::clamp(dt_s, 0.0, span_s) * std::min(dt_s - span_s, 0.0) * bend;
+// Where a parabola of unit bend is against its chord, which spans span_s, dt_s after its beginning.
+double AboveChord(double dt_s, double span_s) {
+  return 0.5 * std::clamp(dt_s, 0.0, span_s) * std::min(dt_s - span_s, 0.0);
 }
 
 }  // namespace
@@ -49,7 +50,7 @@ ImuIntegral::ImuIntegral(const std::vector<GyroSample>& gyro, const std::vector<
                          const Vector3d& bias_accel_m_s2)
     : omega_(3, static_cast<Eigen::Index>(gyro.size())),
       force_(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(gyro.size()))),
-      accel_(3, static_cast<Eigen::Index>(gyro.size())) {
+      accel_(21, static_cast<Eigen::Index>(gyro.size())) {
   times_s_.reserve(gyro.size());
   for (size_t i = 0; i < gyro.size(); ++i) {
     times_s_.push_back(SecondsSince(origin_ns, gyro[i].stamp_ns));
@@ -58,10 +59,13 @@ ImuIntegral::ImuIntegral(const std::vector<GyroSample>& gyro, const std::vector<
   omega_bend_ = Bends(times_s_, omega_);
   if (!accel.empty()) ResampleForce(accel, origin_ns, bias_accel_m_s2);
   states_.resize(times_s_.size());
-  accel_.col(0) = force_.col(0);
-  for (size_t i = 0; i + 1 < times_s_.size(); ++i) {
-    Turn(states_[i], i, times_s_[i + 1] - times_s_[i], &states_[i + 1]);
-    accel_.col(i + 1) = states_[i + 1].R * force_.col(i + 1);
+  for (size_t i = 0; i < times_s_.size(); ++i) {
+    State& state = states_[i];
+    if (i > 0) Turn(states_[i - 1], i - 1, times_s_[i] - times_s_[i - 1], &state);
+    WithDerivatives force;
+    force << state.R * force_.col(i), -state.R * Hat(Vector3d(force_.col(i))) * state.J_rot,
+        -state.R;
+    accel_.col(i) = force.reshaped();
   }
   accel_bend_ = Bends(times_s_, accel_);
   for (size_t i = 0; i + 1 < times_s_.size(); ++i) {
@@ -78,7 +82,7 @@ void ImuIntegral::ResampleForce(const std::vector<AccelSample>& accel, int64_t o
     times_s.push_back(SecondsSince(origin_ns, accel[i].stamp_ns));
     force.col(i) = accel[i].accel_gyro_m_s2 - bias_accel_m_s2;
   }
-  const Eigen::Matrix3Xd bends = Bends(times_s, force);
+  const MatrixXd bends = Bends(times_s, force);
   size_t next = 0;  // first accelerometer sample after the gyro's
   for (size_t i = 0; i < times_s_.size(); ++i) {
     while (next < times_s.size() && times_s[next] <= times_s_[i]) ++next;
@@ -89,7 +93,7 @@ void ImuIntegral::ResampleForce(const std::vector<AccelSample>& accel, int64_t o
     const size_t before = next - 1;
     const double span_s = times_s[next] - times_s[before], dt_s = times_s_[i] - times_s[before];
     force_.col(i) = force.col(before) + dt_s / span_s * (force.col(next) - force.col(before)) +
-                    AboveChord(bends.col(before), dt_s, span_s);
+                    AboveChord(dt_s, span_s) * bends.col(before);
   }
 }
 
@@ -106,24 +110,18 @@ void ImuIntegral::Turn(const State& from, size_t i, double dt_s, State* to) cons
   to->J_rot = turn.transpose() * from.J_rot - dt_s * RightJacobian(theta);
 }
 
-// The derivatives are of straight lines.
 void ImuIntegral::Travel(const State& from, size_t i, double dt_s, State* to) const {
   const double span_s = times_s_[i + 1] - times_s_[i];
-  const bool inside = dt_s >= 0.0 && dt_s <= span_s;
-  const Vector3d bend = inside ? Vector3d(accel_bend_.col(i)) : Vector3d::Zero();
+  const auto row = static_cast<Eigen::Index>(i);
+  WithDerivatives bend = accel_bend_.col(row).reshaped(3, 7);
+  if (dt_s < 0.0 || dt_s > span_s) bend.setZero();
   const double weight = std::clamp(dt_s / span_s, 0.0, 1.0);
-  const Vector3d a0 = accel_.col(i);
-  const Vector3d a1 =
-      (1.0 - weight) * a0 + weight * accel_.col(i + 1) + AboveChord(bend, dt_s, span_s);
-  const Matrix3d bg0 = -Hat(a0) * from.R * from.J_rot;
-  const Matrix3d bg1 = -Hat(a1) * to->R * to->J_rot;
-  const double half = 0.5 * dt_s, third = dt_s * dt_s / 3.0, sixth = dt_s * dt_s / 6.0;
-  to->v = from.v + half * (a0 + a1) - std::pow(dt_s, 3) / 12.0 * bend;
-  to->p = from.p + dt_s * from.v + third * a0 + sixth * a1 - std::pow(dt_s, 4) / 24.0 * bend;
-  to->J_v_bg = from.J_v_bg + half * (bg0 + bg1);
-  to->J_p_bg = from.J_p_bg + dt_s * from.J_v_bg + third * bg0 + sixth * bg1;
-  to->J_v_ba = from.J_v_ba - half * (from.R + to->R);
-  to->J_p_ba = from.J_p_ba + dt_s * from.J_v_ba - third * from.R - sixth * to->R;
+  const WithDerivatives a0 = accel_.col(row).reshaped(3, 7);
+  const WithDerivatives a1 = (1.0 - weight) * a0 + weight * accel_.col(row + 1).reshaped(3, 7) +
+                             AboveChord(dt_s, span_s) * bend;
+  to->v = from.v + 0.5 * dt_s * (a0 + a1) - std::pow(dt_s, 3) / 12.0 * bend;
+  to->p = from.p + dt_s * from.v + dt_s * dt_s / 6.0 * (2.0 * a0 + a1) -
+          std::pow(dt_s, 4) / 24.0 * bend;
 }
 
 size_t ImuIntegral::Segment(double time_s, double* weight_next) const {
@@ -150,15 +148,16 @@ ImuDelta ImuIntegral::Between(double from_s, double to_s) const {
   delta.dt_s = to_s - from_s;
   const Matrix3d R_a_b = R_a_ref * b.R;
   delta.q_i_j = Eigen::Quaterniond(R_a_b).normalized();
-  delta.dv = R_a_ref * (b.v - a.v);
-  delta.dp = R_a_ref * (b.p - a.p - a.v * delta.dt_s);
+  const WithDerivatives dv = R_a_ref * (b.v - a.v);
+  const WithDerivatives dp = R_a_ref * (b.p - a.p - a.v * delta.dt_s);
+  delta.dv = dv.col(0);
+  delta.dp = dp.col(0);
   // The frame at `from` turns with the bias too: Exp(J d)' x = x + x x (J d).
   delta.J_rot_bias_gyro = b.J_rot - R_a_b.transpose() * a.J_rot;
-  delta.J_dv_bias_gyro = R_a_ref * (b.J_v_bg - a.J_v_bg) + Hat(delta.dv) * a.J_rot;
-  delta.J_dp_bias_gyro =
-      R_a_ref * (b.J_p_bg - a.J_p_bg - a.J_v_bg * delta.dt_s) + Hat(delta.dp) * a.J_rot;
-  delta.J_dv_bias_accel = R_a_ref * (b.J_v_ba - a.J_v_ba);
-  delta.J_dp_bias_accel = R_a_ref * (b.J_p_ba - a.J_p_ba - a.J_v_ba * delta.dt_s);
+  delta.J_dv_bias_gyro = dv.middleCols<3>(1) + Hat(delta.dv) * a.J_rot;
+  delta.J_dp_bias_gyro = dp.middleCols<3>(1) + Hat(delta.dp) * a.J_rot;
+  delta.J_dv_bias_accel = dv.rightCols<3>();
+  delta.J_dp_bias_accel = dp.rightCols<3>();
   return delta;
 }
 
@@ -205,7 +204,7 @@ Vector3d ImuIntegral::RateAt(double time_s) const {
   double weight = 0.0;
   const size_t i = Segment(time_s, &weight);
   return (1.0 - weight) * omega_.col(i) + weight * omega_.col(i + 1) +
-         AboveChord(omega_bend_.col(i), time_s - times_s_[i], times_s_[i + 1] - times_s_[i]);
+         AboveChord(time_s - times_s_[i], times_s_[i + 1] - times_s_[i]) * omega_bend_.col(i);
 }
 
 Vector3d ImuIntegral::ForceAt(double time_s) const {

@@ -62,12 +62,12 @@ class ImuIntegral {
   Eigen::Vector3d ForceAt(double time_s) const;        // gyro frame, bias removed [m/s^2]
 
  private:
+  // A vector, and its derivatives by the biases of gyro and accelerometer.
+  using WithDerivatives = Eigen::Matrix<double, 3, 7>;
   struct State {  // at one time, in the gyro frame of the first sample
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
     Eigen::Matrix3d J_rot = Eigen::Matrix3d::Zero();  // right perturbation by the gyro's bias
-    Eigen::Vector3d v = Eigen::Vector3d::Zero(), p = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d J_v_bg = Eigen::Matrix3d::Zero(), J_v_ba = Eigen::Matrix3d::Zero();
-    Eigen::Matrix3d J_p_bg = Eigen::Matrix3d::Zero(), J_p_ba = Eigen::Matrix3d::Zero();
+    WithDerivatives v = WithDerivatives::Zero(), p = WithDerivatives::Zero();
   };
   void ResampleForce(const std::vector<AccelSample>& accel, int64_t origin_ns,
                      const Eigen::Vector3d& bias_accel_m_s2);
@@ -78,10 +78,10 @@ class ImuIntegral {
   size_t Segment(double time_s, double* weight_next) const;
 
   std::vector<double> times_s_;  // of the gyro samples
-  // At the gyro samples; accel_: the force in the frame of reference. Second derivatives: of the
-  // stretch from each sample to the next.
-  Eigen::Matrix3Xd omega_, force_, accel_;
-  Eigen::Matrix3Xd omega_bend_, accel_bend_;
+  // At the gyro samples; accel_: the force in the frame of reference, WithDerivatives. Bends:
+  // second derivatives by time of the stretch from each sample to the next.
+  Eigen::Matrix3Xd omega_, force_;
+  Eigen::MatrixXd accel_, omega_bend_, accel_bend_;
   std::vector<State> states_;
 };
 
