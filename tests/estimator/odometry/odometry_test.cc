@@ -139,8 +139,9 @@ TEST(Odometry, CovarianceIsHonest) {
   EXPECT_LT(velocity, 2.0);
   EXPECT_GT(tilt, 0.3);
   EXPECT_LT(tilt, 2.0);
-  EXPECT_LT(std::abs(focal), 1.0);  // of 0.41: no bias. With residuals that are not in pixels it
-                                    // was 2.6 sigmas too long
+  // The mean of six has a sigma of 0.41. With residuals that are not in pixels it is 1.05, which is
+  // a focal length that is too long.
+  EXPECT_LT(std::abs(focal), 0.82);
 }
 
 // Round a heap of points, which stay in sight: what is kept of them holds the position.
