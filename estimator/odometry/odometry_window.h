@@ -131,10 +131,22 @@ class OdometryWindow {
   bool Believable(const OdometryLandmark& landmark, const OdometrySighting& sighting) const;
   void DropUnbelievable(OdometryLandmark* landmark) const;
   void TriangulateNew();
-  double ParallaxRad(const OdometrySighting& a, const OdometrySighting& b) const;
-  void ChooseKept();
   void DropOutliersAndUpdateNoise(const Program& program);
   void Recentre();
+
+  // The steps of MarginaliseOldest (window_marginalisation.cc).
+  double ParallaxRad(const OdometrySighting& a, const OdometrySighting& b) const;
+  void ChooseKept();
+  // How many of a landmark's sightings, which are by age, are of the window's older half; and how
+  // many go with the oldest keyframe.
+  size_t OlderSightings(const OdometryLandmark& landmark) const;
+  size_t LeavingSightings(const OdometryLandmark& landmark) const;
+  // Columns of what leaves, then of what the prior may speak of; returns the number of the former.
+  int LayOutMarginalisation(Program* program, ReducedInformation* information,
+                            std::vector<PriorBlock>* staying);
+  bool AddWhatLeaves(const Program& program, ReducedInformation* information) const;
+  void RemoveWhatLeaves();
+  void SetPriorOfWhatIsKnown(const std::vector<PriorBlock>& blocks, const Quadratic& left);
 
   const OdometryWindowOptions options_;
   const Eigen::Quaterniond q_gyro_cam_;
