@@ -19,20 +19,36 @@ double MedianIntervalOf(const std::vector<Stamped>& items) {
   return 1e-9 * static_cast<double>(MedianInPlace(&intervals));
 }
 
-}  // namespace
-
-std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
-                                  const std::vector<TrackedPoint>& b) {
-  std::vector<Match> matches;
+// Calls take(point of a, point of b) for the tracks seen in both, by ascending id.
+template <typename Take>
+void ForEachCommon(const std::vector<TrackedPoint>& a, const std::vector<TrackedPoint>& b,
+                   const Take& take) {
   for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
     if (i->track_id == j->track_id) {
-      matches.push_back({i->px, j->px, j->noise_factor, i->track_id});
+      take(*i, *j);
       ++i, ++j;
     } else {
       i->track_id < j->track_id ? ++i : ++j;
     }
   }
+}
+
+}  // namespace
+
+std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
+                                  const std::vector<TrackedPoint>& b) {
+  std::vector<Match> matches;
+  matches.reserve(CountMatches(a, b));
+  ForEachCommon(a, b, [&](const TrackedPoint& x, const TrackedPoint& y) {
+    matches.push_back({x.px, y.px, y.noise_factor.cast<double>(), x.track_id});
+  });
   return matches;
+}
+
+size_t CountMatches(const std::vector<TrackedPoint>& a, const std::vector<TrackedPoint>& b) {
+  size_t count = 0;
+  ForEachCommon(a, b, [&](const TrackedPoint&, const TrackedPoint&) { ++count; });
+  return count;
 }
 
 std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,

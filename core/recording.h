@@ -35,13 +35,24 @@ struct Frame {
   int picture = -1;
 };
 
+// There are some hundred million of these in a few hours of recording, so that they are packed: 32
+// bytes. The order of the members leaves no gaps, and the noise factor, which is an estimate of a
+// tenth or so, is rounded to 11 bits.
 struct TrackedPoint {
-  int64_t track_id = 0;
+  using NoiseFactor = Eigen::Matrix<Eigen::half, 3, 1>;
+
+  TrackedPoint() = default;
+  TrackedPoint(int64_t id, const Eigen::Vector2d& pixel,
+               const Eigen::Vector3d& factor = Eigen::Vector3d(1.0, 0.0, 1.0))
+      : px(pixel), track_id(id), noise_factor(factor.cast<Eigen::half>()) {}
+
   Eigen::Vector2d px = Eigen::Vector2d::Zero();  // pixel (0,0) is the centre of the top-left pixel
+  int64_t track_id = 0;
   // Lower triangular factor L (xx, yx, yy) of its noise: covariance sigma^2 L L^T, with the sigma
   // of the recording's noise. Corners are found less well along an edge, or along motion blur.
-  Eigen::Vector3d noise_factor{1.0, 0.0, 1.0};
+  NoiseFactor noise_factor{Eigen::half(1.0F), Eigen::half(0.0F), Eigen::half(1.0F)};
 };
+static_assert(sizeof(TrackedPoint) == 32, "the memory of long recordings is counted in these");
 
 struct Match {
   static constexpr int64_t kNoTrack = -1;
@@ -167,7 +178,11 @@ struct Recording {
 std::vector<Match> MatchesBetween(const std::vector<TrackedPoint>& a,
                                   const std::vector<TrackedPoint>& b);
 
-// The same between frames i and i + gap, for all i.
+// How many there are.
+size_t CountMatches(const std::vector<TrackedPoint>& a, const std::vector<TrackedPoint>& b);
+
+// The same between frames i and i + gap, for all i. Of a long recording they take more memory than
+// its tracks: use MatchesBetween for one pair at a time there.
 std::vector<FramePair> PairsFromTracks(const std::vector<std::vector<TrackedPoint>>& tracks,
                                        int gap);
 

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 namespace camgyro {
 namespace {
 
@@ -22,6 +24,27 @@ TEST(Recording, PairsHoldTheTracksSeenInBothFrames) {
   EXPECT_EQ(skipping[0].frame_b, 2);
   EXPECT_EQ(skipping[0].matches.size(), 2u);
   EXPECT_TRUE(PairsFromTracks(tracks, 3).empty());
+}
+
+TEST(Recording, MatchesAreCountedAsTheyAreMade) {
+  const std::vector<TrackedPoint> a = {{1, {10, 11}}, {3, {30, 31}}, {7, {70, 71}}};
+  const std::vector<TrackedPoint> b = {{3, {32, 33}}, {7, {72, 73}}, {8, {80, 81}}};
+  EXPECT_EQ(CountMatches(a, b), 2u);
+  EXPECT_EQ(CountMatches(a, b), MatchesBetween(a, b).size());
+  EXPECT_EQ(CountMatches(a, {}), 0u);
+}
+
+// The noise factor is kept with 11 bits; what has none is exact.
+TEST(Recording, NoiseOfAPointIsRoundedToAThousandth) {
+  const TrackedPoint plain(4, {1.0, 2.0});
+  EXPECT_EQ(plain.noise_factor.cast<double>(), Eigen::Vector3d(1.0, 0.0, 1.0));
+  const Eigen::Vector3d factor(1.3331, -0.4012, 0.7077);
+  const TrackedPoint point(4, {1.0, 2.0}, factor);
+  const std::vector<Match> matches = MatchesBetween({plain}, {point});
+  ASSERT_EQ(matches.size(), 1u);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(matches[0].noise_factor_b[i], factor[i], std::abs(factor[i]) / 2048.0);
+  }
 }
 
 TEST(Recording, FramesAreLeftOutWithAllThatTheyHave) {

@@ -228,7 +228,7 @@ TEST(KltTracker, KnowsWhereItsNoiseIs) {
       });
       if (i < 3 || old == before.end()) continue;
       const Eigen::Vector2d error = point.px - old->px - Eigen::Vector2d(3.0, 0.0);
-      const Eigen::Vector3d& L = point.noise_factor;
+      const Eigen::Vector3d L = point.noise_factor.cast<double>();
       const Eigen::Vector2d whitened(error.x() / L[0],
                                      (error.y() - L[1] * error.x() / L[0]) / L[2]);
       raw_x += error.x() * error.x();
