@@ -33,9 +33,15 @@ CsvReader OpenAttitudes(const std::string& file) {
 }
 
 Result<std::vector<int64_t>> CollectStamps(CsvReader csv, size_t stamp_columns) {
-  std::vector<int64_t> stamps;
+  std::vector<int64_t> stamps, last(stamp_columns);
   while (csv.NextRow()) {
-    for (size_t i = 0; i < stamp_columns; ++i) stamps.push_back(csv.Stamp(i));
+    for (size_t i = 0; i < stamp_columns; ++i) {
+      const int64_t stamp = csv.Stamp(i);
+      // Tables repeat stamps row by row, and may have millions of rows.
+      if (!stamps.empty() && stamp == last[i]) continue;
+      stamps.push_back(stamp);
+      last[i] = stamp;
+    }
   }
   if (!csv.status()) return tl::unexpected(csv.status().error());
   std::sort(stamps.begin(), stamps.end());
@@ -123,23 +129,30 @@ Result<std::vector<int64_t>> ReadAttitudeStamps(const std::string& file) {
 Status ReadTracks(const std::string& file, Recording* recording) {
   CsvReader csv = OpenTracks(file);
   const FrameIndex index(recording->frames);
-  std::vector<std::map<int64_t, Eigen::Vector2d>> by_frame(recording->frames.size());
+  std::vector<std::vector<TrackedPoint>> tracks(recording->frames.size());
+  int last_frame = 0;
   while (csv.NextRow()) {
     const int frame = index.Find(csv.Stamp(0), &csv);
-    const int64_t id = csv.Integer(1);
-    const Eigen::Vector2d px = ReadPixel(2, recording->camera, &csv);
-    if (!by_frame[frame].emplace(id, px).second) {
-      csv.Fail(Concat("track_id ", id, " repeats within the frame of timestamp ", csv.Cell(0),
-                      ", expected it once"));
+    const TrackedPoint point(csv.Integer(1), ReadPixel(2, recording->camera, &csv));
+    std::vector<TrackedPoint>& points = tracks[frame];
+    auto after = points.end();  // of those with a smaller id; most tables have them in order
+    if (!points.empty() && points.back().track_id >= point.track_id) {
+      after = std::lower_bound(points.begin(), points.end(), point.track_id,
+                               [](const TrackedPoint& p, int64_t id) { return p.track_id < id; });
+    }
+    if (after != points.end() && after->track_id == point.track_id) {
+      csv.Fail(Concat("track_id ", point.track_id, " repeats within the frame of timestamp ",
+                      csv.Cell(0), ", expected it once"));
     }
     if (!csv.status()) return csv.status();
+    // Where frames come one after the other, one that is complete gives back what it took ahead.
+    if (points.empty()) tracks[last_frame].shrink_to_fit();
+    points.insert(after, point);
+    last_frame = frame;
   }
   if (!csv.status()) return csv.status();
-  recording->tracks.resize(by_frame.size());
-  for (size_t i = 0; i < by_frame.size(); ++i) {
-    recording->tracks[i].reserve(by_frame[i].size());
-    for (const auto& [id, px] : by_frame[i]) recording->tracks[i].push_back({id, px});
-  }
+  for (std::vector<TrackedPoint>& points : tracks) points.shrink_to_fit();
+  recording->tracks = std::move(tracks);
   return {};
 }
 

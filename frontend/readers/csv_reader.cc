@@ -10,6 +10,8 @@
 namespace camgyro {
 namespace {
 
+constexpr size_t kPieceBytes = 1 << 20;
+
 void Split(std::string_view text, char separator, std::vector<std::string_view>* cells) {
   cells->clear();
   for (size_t begin = 0;;) {
@@ -28,12 +30,14 @@ bool IsNumber(std::string_view cell) {
 }  // namespace
 
 CsvReader::CsvReader(const std::string& file) : file_(file) {
-  Result<std::string> content = ReadWholeFile(file);
-  if (!content) {
-    status_ = tl::unexpected(content.error());
+  status_ = CheckIsFile(file);
+  if (!status_) return;
+  stream_.open(file, std::ios::binary);
+  if (!stream_) {
+    status_ = BadInput(Concat(file_, ": cannot be opened for reading"));
     return;
   }
-  content_ = *std::move(content);
+  FindLineEnd();
   if (content_.compare(0, 3, "\xEF\xBB\xBF") == 0) position_ = 3;
 }
 
@@ -58,9 +62,10 @@ CsvReader::CsvReader(const std::string& file, std::vector<std::string> columns,
 
 CsvReader CsvReader::ByName(const std::string& file, int skip_lines) {
   CsvReader csv(file);
-  while (csv.line_ < skip_lines && csv.position_ < csv.content_.size()) {
-    csv.position_ = std::min(csv.content_.find('\n', csv.position_), csv.content_.size()) + 1;
-    ++csv.line_;
+  for (size_t end = 0; csv.line_ < skip_lines; ++csv.line_) {
+    end = csv.FindLineEnd();
+    if (csv.position_ >= csv.content_.size()) break;
+    csv.position_ = end + 1;
   }
   csv.FindHeader();
   if (csv.header_.empty()) {
@@ -137,15 +142,29 @@ bool CsvReader::HasColumn(const std::string& name) const {
   return std::find(header_.begin(), header_.end(), name) != header_.end();
 }
 
+size_t CsvReader::FindLineEnd() {
+  for (size_t searched = position_;;) {
+    const size_t end = content_.find('\n', searched);
+    if (end != std::string::npos) return end;
+    searched = content_.size();
+    if (!stream_.good()) return searched;
+    content_.resize(searched + kPieceBytes);
+    stream_.read(&content_[searched], kPieceBytes);
+    content_.resize(searched + static_cast<size_t>(stream_.gcount()));
+    // After an error the rest is not there, and what is there is no result.
+    if (stream_.bad() && status_) status_ = BadInput(Concat(file_, ": cannot be read"));
+  }
+}
+
 bool CsvReader::NextLine(std::string_view* text) {
-  while (position_ < content_.size()) {
-    const size_t end = std::min(content_.find('\n', position_), content_.size());
+  for (;;) {
+    const size_t end = FindLineEnd();
+    if (position_ >= content_.size()) return false;
     *text = Trim(std::string_view(content_).substr(position_, end - position_));
     position_ = end + 1;
     ++line_;
     if (!text->empty()) return true;
   }
-  return false;
 }
 
 size_t CsvReader::NextWidth() {
@@ -163,11 +182,16 @@ size_t CsvReader::NextWidth() {
 }
 
 bool CsvReader::NextRow() {
+  if (position_ > kPieceBytes) {  // what was handed out goes
+    content_.erase(0, position_);
+    position_ = 0;
+  }
   std::string_view text;
   do {
-    if (!status_ || !NextLine(&text)) return false;
+    if (!status_ || !NextLine(&text) || !status_) return false;
   } while (text.front() == '#');
-  Split(text, separator_, &cells_);
+  row_ = text;
+  Split(row_, separator_, &cells_);
 
   if (file_width_ == 0 && std::count(widths_.begin(), widths_.end(), width()) > 0) {
     file_width_ = width();

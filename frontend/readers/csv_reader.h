@@ -3,6 +3,7 @@
 #define CAMGYRO_FRONTEND_READERS_CSV_READER_H_
 
 #include <cstdint>
+#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,8 +12,9 @@
 
 namespace camgyro {
 
-// Reads a whole file and hands out its rows. The first error sticks: NextRow() is false from then
-// on, and status() says what was wrong; cells read after an error are zero.
+// Hands out the rows of a file, of which it holds a piece at a time. The first error sticks:
+// NextRow() is false from then on, and status() says what was wrong; cells read after an error are
+// zero.
 //
 //   CsvReader csv(file, {"timestamp [ns]", "u [px]", "v [px]"}, {3});
 //   while (csv.NextRow()) points.push_back({csv.Stamp(0), csv.Number(1), csv.Number(2)});
@@ -64,8 +66,10 @@ class CsvReader {
   const Status& status() const { return status_; }
 
  private:
-  explicit CsvReader(const std::string& file);  // reads the content only
+  explicit CsvReader(const std::string& file);  // opens it only
   void FindHeader();
+  // Where the line that begins at position_ ends, in content_; reads on until it is whole.
+  size_t FindLineEnd();
   bool NextLine(std::string_view* text);
   void FailCell(size_t column, const std::string& expected);
 
@@ -73,12 +77,16 @@ class CsvReader {
   char separator_ = ',';
   std::vector<std::string> columns_;
   std::vector<size_t> widths_;
+  std::ifstream stream_;  // empty of what is in content_
+  // The piece: what is not handed out yet, and until NextRow() also what is, so that the search for
+  // a header, or NextWidth(), can go back.
   std::string content_;
-  size_t position_ = 0;
+  size_t position_ = 0;  // in content_
   int line_ = 0;
   size_t file_width_ = 0;  // of the first row; 0 before it
   std::vector<std::string> header_;
-  std::vector<std::string_view> cells_;
+  std::string row_;                      // the current one
+  std::vector<std::string_view> cells_;  // of row_
   Status status_;
 };
 
