@@ -40,16 +40,22 @@ std::string FramesCsv(const std::vector<Frame>& frames) {
   return csv;
 }
 
-std::string TracksCsv(const Recording& recording, int decimals) {
-  std::string csv = "#timestamp [ns],track_id,u [px],v [px]\n";
-  for (size_t i = 0; i < recording.tracks.size(); ++i) {
-    for (const TrackedPoint& point : recording.tracks[i]) {
-      csv += Format("%lld,%lld,%.*f,%.*f\n", Stamp(recording.frames[i].stamp_ns),
-                    static_cast<long long>(point.track_id), decimals, point.px.x(), decimals,
-                    point.px.y());
-    }
+std::string TracksCsvHeader() { return "#timestamp [ns],track_id,u [px],v [px]\n"; }
+
+std::string TracksCsvRows(int64_t stamp_ns, const std::vector<TrackedPoint>& tracks, int decimals) {
+  std::string csv;
+  for (const TrackedPoint& point : tracks) {
+    csv += Format("%lld,%lld,%.*f,%.*f\n", Stamp(stamp_ns), static_cast<long long>(point.track_id),
+                  decimals, point.px.x(), decimals, point.px.y());
   }
   return csv;
+}
+
+void WriteTracksCsv(const Recording& recording, int decimals, std::ostream* out) {
+  *out << TracksCsvHeader();
+  for (size_t i = 0; i < recording.tracks.size(); ++i) {
+    *out << TracksCsvRows(recording.frames[i].stamp_ns, recording.tracks[i], decimals);
+  }
 }
 
 std::string ImuCsv(const Recording& recording) {

@@ -2,6 +2,8 @@
 #ifndef CAMGYRO_CORE_RECORDING_CSV_H_
 #define CAMGYRO_CORE_RECORDING_CSV_H_
 
+#include <cstdint>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -13,8 +15,11 @@ namespace camgyro {
 // where a frame has none.
 std::string FramesCsv(const std::vector<Frame>& frames);
 
-// cam0/tracks.csv: one row per point, pixels with so many decimals.
-std::string TracksCsv(const Recording& recording, int decimals);
+// cam0/tracks.csv: one row per point, pixels with so many decimals. Its rows take more memory than
+// the tracks, a gigabyte for an hour, so that they come frame by frame, after the header.
+std::string TracksCsvHeader();
+std::string TracksCsvRows(int64_t stamp_ns, const std::vector<TrackedPoint>& tracks, int decimals);
+void WriteTracksCsv(const Recording& recording, int decimals, std::ostream* out);
 
 // imu0/data.csv: rates [rad/s] and, if the recording has an accelerometer, specific forces [m/s^2],
 // all at the gyro's stamps: between its own samples the specific force is interpolated, and gyro

@@ -204,13 +204,13 @@ Status FileSet::Write() const {
     for (const auto& [temporary, name] : written) fs::remove(temporary, error);
     return BadUsage("--out: cannot write " + file + ": " + why);
   };
-  for (const auto& [name, text] : files_) {
+  for (const auto& [name, write] : files_) {
     const fs::path file = fs::path(folder_) / name;
     fs::create_directories(file.parent_path(), error);
     if (error) return give_up(file.string(), error.message());
     written.emplace_back(TemporaryName(file), file);
     std::ofstream stream(written.back().first, std::ios::binary);
-    stream << text;
+    write(&stream);
     stream.close();
     if (!stream) return give_up(file.string(), "the disk is full, or not writable");
   }

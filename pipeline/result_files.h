@@ -2,6 +2,8 @@
 #ifndef CAMGYRO_PIPELINE_RESULT_FILES_H_
 #define CAMGYRO_PIPELINE_RESULT_FILES_H_
 
+#include <functional>
+#include <ostream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,7 +24,11 @@ class FileSet {
   // Is the folder there, or can it be made? Asked before hours of work, not after them.
   Status CheckWritable() const;
   void Add(const std::string& name, std::string text) {
-    files_.emplace_back(name, std::move(text));
+    Add(name, [text = std::move(text)](std::ostream* out) { *out << text; });
+  }
+  // The same for a text that is too long to be held: Write() calls `write`.
+  void Add(const std::string& name, std::function<void(std::ostream*)> write) {
+    files_.emplace_back(name, std::move(write));
   }
   // Makes the folder (names may hold folders too). On failure nothing new is left behind.
   Status Write() const;
@@ -31,7 +37,7 @@ class FileSet {
 
  private:
   std::string folder_;
-  std::vector<std::pair<std::string, std::string>> files_;
+  std::vector<std::pair<std::string, std::function<void(std::ostream*)>>> files_;
 };
 
 // attitudes: no pixels were used; noise and residuals are then in rad, under the keys noise_rad and

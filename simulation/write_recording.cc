@@ -55,6 +55,24 @@ long long Stamp(int64_t stamp_ns) { return static_cast<long long>(stamp_ns); }
 
 std::string ImageName(const Frame& frame) { return std::to_string(frame.stamp_ns) + ".png"; }
 
+// Tracks that the simulation has kept, or else made here, frame by frame: with their truth, those
+// of an hour do not fit into a gigabyte.
+Status WriteTracks(const Simulated& s, const Scenario& scenario, const fs::path& path) {
+  constexpr int kDecimals = 9;
+  TextFile file(path);
+  file.Print("%s", TracksCsvHeader().c_str());
+  const auto write = [&](size_t i, const std::vector<TrackedPoint>& tracks) {
+    file.Print("%s", TracksCsvRows(s.recording.frames[i].stamp_ns, tracks, kDecimals).c_str());
+  };
+  for (size_t i = 0; i < s.recording.tracks.size(); ++i) write(i, s.recording.tracks[i]);
+  if (s.recording.tracks.empty()) {
+    ForEachFrame(scenario, s,
+                 [&](size_t i, std::vector<TrackedPoint>* tracks,
+                     std::vector<PointTruth>* /*truth*/) { write(i, *tracks); });
+  }
+  return file.Close();
+}
+
 Status WriteFrames(const Simulated& s, const Scenario& scenario, const fs::path& cam) {
   std::vector<Frame> frames = s.recording.frames;
   for (Frame& frame : frames) {
@@ -117,7 +135,9 @@ Status WriteTruth(const Simulated& s, const Scenario& scenario, const fs::path& 
       file.Print("      - {name: %s, unit: %s, value: %.9g}\n", p.name, p.unit, p.value);
     }
   });
-  if (!s.recording.tracks.empty()) file.Print("noise_px: %.9g\n", scenario.tracks.noise_px);
+  if (scenario.video.format == VideoFormat::kNone) {
+    file.Print("noise_px: %.9g\n", scenario.tracks.noise_px);
+  }
   file.Print("seed: %llu\n", static_cast<unsigned long long>(scenario.seed));
   return file.Close();
 }
@@ -223,8 +243,8 @@ Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
     fs::create_directories(root / "cam0");
     fs::create_directories(root / "imu0");
     Status status = WriteFrames(simulated, scenario, root / "cam0");
-    if (status && !simulated.recording.tracks.empty()) {
-      status = WriteText(root / "cam0/tracks.csv", TracksCsv(simulated.recording, 9));
+    if (status && scenario.video.format == VideoFormat::kNone) {
+      status = WriteTracks(simulated, scenario, root / "cam0/tracks.csv");
     }
     if (status) status = WriteText(root / "imu0/data.csv", ImuCsv(simulated.recording));
     if (status) status = WriteSensorYaml(simulated, scenario, root);

@@ -78,7 +78,9 @@ Status WriteTables(const Rectified& rectified, const ExportFormat* format,
   FileSet files(folder);
   const Recording& recording = rectified.recording;
   files.Add("cam0/data.csv", FramesCsv(recording.frames));
-  if (!recording.tracks.empty()) files.Add("cam0/tracks.csv", TracksCsv(recording, 6));
+  if (!recording.tracks.empty()) {
+    files.Add("cam0/tracks.csv", [&](std::ostream* out) { WriteTracksCsv(recording, 6, out); });
+  }
   files.Add("imu0/data.csv", ImuCsv(recording));
   ExportInput input;
   input.source = fs::path(FLAGS_calibration).filename().string() + ", rectified";

@@ -21,8 +21,7 @@ Status RunSimulate(const std::string& scenario_path, const std::string& out_dir,
   const Result<Scenario> scenario = simulation::LoadScenario(scenario_path, overrides);
   if (!scenario) return tl::unexpected(scenario.error());
   const bool video = scenario->video.format != VideoFormat::kNone;
-  const Result<Simulated> simulated =
-      video ? simulation::SimulateSensors(*scenario) : simulation::SimulateTracks(*scenario);
+  const Result<Simulated> simulated = simulation::SimulateSensors(*scenario);  // tracks: as written
   if (!simulated) {
     Error error = simulated.error();
     error.message = scenario_path + ": " + error.message;

@@ -54,7 +54,7 @@ Status RunTrack(const std::vector<std::string>& arguments) {
   }
   if (!summary) return tl::unexpected(summary.error());
   if (Status strict = CheckStrict(*recording); !strict) return strict;
-  files.Add("cam0/tracks.csv", TracksCsv(*recording, 4));
+  files.Add("cam0/tracks.csv", [&](std::ostream* out) { WriteTracksCsv(*recording, 4, out); });
   if (Status written = files.Write(); !written) return written;
   if (FLAGS_quiet) return {};
   std::printf("%s: %s\n%s%s", recording->path.c_str(), DescribeRecording(*recording).c_str(),

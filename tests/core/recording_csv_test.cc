@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <sstream>
+
 namespace camgyro {
 namespace {
 
@@ -22,7 +24,9 @@ TEST(RecordingCsv, TracksAreRoundedAsAskedFor) {
   recording.frames.resize(2);
   recording.frames[1].stamp_ns = 7;
   recording.tracks = {{{3, {1.23456, 2.0}}}, {{3, {-0.5, 4.00006}}, {4, {0.0, 1.0}}}};
-  EXPECT_EQ(TracksCsv(recording, 4),
+  std::ostringstream csv;
+  WriteTracksCsv(recording, 4, &csv);
+  EXPECT_EQ(csv.str(),
             "#timestamp [ns],track_id,u [px],v [px]\n0,3,1.2346,2.0000\n7,3,-0.5000,4.0001\n"
             "7,4,0.0000,1.0000\n");
 }

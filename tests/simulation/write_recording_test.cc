@@ -110,6 +110,16 @@ TEST_F(WriteRecordingTest, TruthNamesParametersAndEffects) {
   EXPECT_THAT(truth, HasSubstr("noise_px: 1"));
 }
 
+// Without tracks in memory they are made while they are written.
+TEST_F(WriteRecordingTest, TracksAreTheSameWhetherKeptOrNot) {
+  const Scenario scenario = ParseScenario(kTracks).value();
+  ASSERT_TRUE(WriteRecording(SimulateTracks(scenario).value(), scenario, Folder("kept")));
+  ASSERT_TRUE(WriteRecording(SimulateSensors(scenario).value(), scenario, Folder("made")));
+  const auto kept = Contents(Folder("kept"));
+  EXPECT_GT(kept.at("cam0/tracks.csv").size(), 10000u);
+  EXPECT_TRUE(kept == Contents(Folder("made")));
+}
+
 TEST_F(WriteRecordingTest, SameScenarioSameBytes) {
   for (const auto& [yaml, overrides] :
        std::vector<std::pair<std::string, std::vector<std::string>>>{

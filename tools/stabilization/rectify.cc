@@ -55,6 +55,7 @@ std::pair<std::vector<TrackedPoint>, double> RectifyPoints(const FrameWarp& warp
                                                            const Calibration& c,
                                                            const std::vector<TrackedPoint>& all) {
   std::vector<TrackedPoint> points;
+  points.reserve(all.size());
   double squares = 0.0;
   for (TrackedPoint point : all) {
     const auto px = warp.ToVirtual(point.px);
