@@ -145,7 +145,7 @@ class CalibrationJob {
         options_(options),
         progress_(progress),
         attitudes_(recording.HasOnlyAttitudes()),
-        input_(MakeEstimationInput(recording, SelectPairs(recording))),
+        input_(OutlineOf(recording, SelectPairs(recording))),
         clock_(&report_.times) {
     report_.residual = options.window.graph.residual;
   }
@@ -242,7 +242,7 @@ class CalibrationJob {
       if (const Status fed = FeedGyro(known_s, &next_sample, &window); !fed) return fed;
       if (window.AddPair(recording_.frames[static_cast<size_t>(pair.frame_a)].stamp_ns,
                          recording_.frames[static_cast<size_t>(pair.frame_b)].stamp_ns,
-                         pair.matches, pair.exposure_a_s,
+                         MatchesOf(recording_, pair), pair.exposure_a_s,
                          pair.exposure_b_s) != AddResult::kAccepted) {
         return BadInput("frames " + std::to_string(pair.frame_a) + " and " +
                         std::to_string(pair.frame_b) +
@@ -289,30 +289,38 @@ class CalibrationJob {
     return refinement;
   }
 
-  Result<Refined> RefineWith(RefinementOptions options, const Calibration& from,
-                             std::optional<double> noise,
-                             std::shared_ptr<const PairLatents> latents = nullptr) const {
-    options.graph.sigma = noise;
-    options.latents = std::move(latents);
-    return Refine(input_, refined_pairs_, from, report_.prior, options);
+  Result<Refined> RefineWith(const RefinementOptions& options, const Calibration& from,
+                             std::optional<double> noise) const {
+    RefinementOptions with = options;
+    with.graph.sigma = noise;
+    return Refine(input_, refined_pairs_, from, report_.prior, with);
   }
 
   // From where another fit ended.
-  Result<Refined> RefineFrom(const Refined& fit, const RefinementOptions& options) const {
-    return RefineWith(options, fit.calibration, fit.quality.noise_px, fit.latents);
+  Result<Refined> RefineFrom(const Refined& fit, const std::vector<TimedPair>& pairs,
+                             const RefinementOptions& options) const {
+    RefinementOptions with = options;
+    with.graph.sigma = fit.quality.noise_px;
+    with.latents = fit.latents;
+    return Refine(input_, pairs, fit.calibration, report_.prior, with);
   }
 
   // Each half alone, from the fit of the whole: it is near, and a half that disagrees leaves it.
-  Halves FitHalves(const RefinementOptions& options, const Refined& whole) const {
-    if (static_cast<int>(refined_pairs_.size()) < kMinPairsForUnseen) return {};
-    HalvesFit fit(input_, refined_pairs_, whole, report_.prior, options);
+  Halves FitHalves(const std::vector<TimedPair>& pairs, const RefinementOptions& options,
+                   const Refined& whole) const {
+    if (static_cast<int>(pairs.size()) < kMinPairsForUnseen) return {};
+    HalvesFit fit(input_, pairs, whole, report_.prior, options);
     ParallelFor(2, [&](size_t half) { fit.Fit(half); });
     return fit.Compare();
   }
 
   Status Refinement() {
     Tell("refinement", 0.0);
-    refined_pairs_ = InformativePairs(input_, estimate_.delay_s, options_.most_refined_pairs);
+    const double left =
+        std::max(options_.least_refined_bytes, options_.most_bytes - BytesOf(recording_));
+    refined_pairs_ = InformativePairs(input_, estimate_.delay_s,
+                                      {options_.most_refined_pairs, left}, graph_options_);
+    AddMatches(recording_, &refined_pairs_);
     if (refined_pairs_.size() < input_.pairs.size()) {
       report_.notes.push_back(
           Format("the recording is long: %zu of %zu pairs, those that tell most, are refined",
@@ -326,7 +334,7 @@ class CalibrationJob {
       const Result<Refined> first = RefineWith(refinement, from, refinement.graph.sigma);
       if (!first) return tl::unexpected(first.error());
       from = SettleEffects(recording_, *first, [&](const Refined& fit) {
-               return RefineFrom(fit, refinement);
+               return RefineFrom(fit, refined_pairs_, refinement);
              }).calibration;
     }
     Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
@@ -361,17 +369,14 @@ class CalibrationJob {
   // taken: that of all tracks also where the halves disagree without the movers as well, since what
   // contradicts itself then is the model, and leaving out what it does not explain would hide it.
   Halves LeaveOutWhatMoves(const RefinementOptions& options, Refined* refined) {
-    const std::vector<TimedPair> all = refined_pairs_;
     const Result<StillFit> still = FitWhatIsStill(
-        input_, all, options.graph,
+        input_, refined_pairs_, options.graph,
         [&](const std::vector<TimedPair>& pairs, const Refined* before) -> Result<Refined> {
-          if (before == nullptr) return *refined;
-          refined_pairs_ = pairs;
-          return RefineFrom(*before, options);
+          return before == nullptr ? Result<Refined>(*refined)
+                                   : RefineFrom(*before, pairs, options);
         });
     if (still && still->moving > 0) {
-      refined_pairs_ = still->pairs;
-      const Halves halves = FitHalves(options, still->fit);
+      const Halves halves = FitHalves(still->pairs, options, still->fit);
       if (!(halves.chi2 > kHalvesLimit)) {
         *refined = still->fit;
         report_.moving_tracks = still->moving;
@@ -381,8 +386,7 @@ class CalibrationJob {
         return halves;
       }
     }
-    refined_pairs_ = all;
-    return FitHalves(options, *refined);
+    return FitHalves(refined_pairs_, options, *refined);
   }
 
   void TakeHalves(const Halves& halves) {
@@ -401,7 +405,7 @@ class CalibrationJob {
   const CalibrateOptions& options_;
   const Progress& progress_;
   const bool attitudes_;
-  const EstimationInput input_;
+  const EstimationInput input_;  // an outline: matches are made where they are used
   CalibrationReport report_;
   StageClock clock_;
   Calibration estimate_, from_start_;

@@ -19,6 +19,7 @@ constexpr double kShareAtFirst = 1e-3;
 
 struct Stretch {
   size_t first = 0, count = 0;  // of the pairs
+  double bytes = 0.0;
   Matrix6d information = Matrix6d::Zero();
 };
 
@@ -38,20 +39,22 @@ Vector6d MotionOf(const EstimationInput& input, const TimedPair& pair, double de
   return motion;
 }
 
-std::vector<Stretch> StretchesOf(const EstimationInput& input, double delay_s) {
+std::vector<Stretch> StretchesOf(const EstimationInput& input, double delay_s,
+                                 const PairGraphOptions& options) {
   std::vector<Stretch> stretches;
   double begin_s = 0.0;
   for (size_t i = 0; i < input.pairs.size(); ++i) {
     const TimedPair& pair = input.pairs[i];
     if (i == 0 || pair.time_a_s - begin_s >= kStretchS) {
-      stretches.push_back({i, 0, Matrix6d::Zero()});
+      stretches.push_back({i, 0, 0.0, Matrix6d::Zero()});
       begin_s = pair.time_a_s;
     }
     Stretch& stretch = stretches.back();
     ++stretch.count;
+    stretch.bytes += RefinementBytes(pair, options);
     const Vector6d motion = MotionOf(input, pair, delay_s);
-    stretch.information += std::max<double>(1.0, static_cast<double>(pair.matches.size())) *
-                           motion * motion.transpose();
+    stretch.information +=
+        std::max<double>(1.0, static_cast<double>(pair.num_matches)) * motion * motion.transpose();
   }
   return stretches;
 }
@@ -72,9 +75,37 @@ double LogDeterminant(const Matrix6d& information) {
 
 }  // namespace
 
-std::vector<TimedPair> InformativePairs(const EstimationInput& input, double delay_s, size_t most) {
-  if (input.pairs.size() <= most || input.rates.empty()) return input.pairs;
-  std::vector<Stretch> stretches = StretchesOf(input, delay_s);
+double RefinementBytes(const TimedPair& pair, const PairGraphOptions& options) {
+  constexpr double kShared = 20.0;  // columns: lens, shutter, mounting, bias, direction, bend
+  constexpr double kTimesHeld = 2.0, kMatchesHeld = 4.0;
+  // Of the rates, at both ends and for the readout, of which nothing is known here, a few more.
+  const double rates = 4.0 + (pair.time_b_s - pair.time_a_s) / options.rate_step_s;
+  return static_cast<double>(pair.num_matches) *
+         (kTimesHeld * (kShared + 3.0 * rates) * sizeof(double) + kMatchesHeld * sizeof(Match));
+}
+
+double BytesOf(const Recording& recording) {
+  double points = 0.0, matches = 0.0;
+  for (const auto& tracks : recording.tracks) points += static_cast<double>(tracks.size());
+  for (const FramePair& pair : recording.matches) {
+    matches += static_cast<double>(pair.matches.size());
+  }
+  // A sample is in the recording, in the outline, and in the graph.
+  const auto samples = static_cast<double>(recording.gyro.size());
+  return points * sizeof(TrackedPoint) + matches * sizeof(Match) +
+         samples * (sizeof(GyroSample) + 2.0 * sizeof(TimedRate)) +
+         static_cast<double>(recording.accel.size()) * sizeof(AccelSample) +
+         static_cast<double>(recording.frames.size()) * (sizeof(Frame) + sizeof(TimedPair));
+}
+
+std::vector<TimedPair> InformativePairs(const EstimationInput& input, double delay_s,
+                                        const PairLimits& limits, const PairGraphOptions& options) {
+  double bytes = 0.0;
+  for (const TimedPair& pair : input.pairs) bytes += RefinementBytes(pair, options);
+  if ((input.pairs.size() <= limits.pairs && bytes <= limits.bytes) || input.rates.empty()) {
+    return input.pairs;
+  }
+  std::vector<Stretch> stretches = StretchesOf(input, delay_s, options);
   Scale(&stretches);
   Matrix6d sum = kShareAtFirst * Matrix6d::Identity();
   const auto gain_of = [&](size_t k) {
@@ -93,6 +124,7 @@ std::vector<TimedPair> InformativePairs(const EstimationInput& input, double del
   std::priority_queue<Entry> queue;
   for (size_t k = 0; k < stretches.size(); ++k) queue.push({gain_of(k), k});
   std::vector<bool> taken(stretches.size(), false);
+  bytes = 0.0;
   for (size_t pairs = 0; !queue.empty();) {
     const Entry best = {gain_of(queue.top().stretch), queue.top().stretch};
     queue.pop();
@@ -100,8 +132,10 @@ std::vector<TimedPair> InformativePairs(const EstimationInput& input, double del
       queue.push(best);
       continue;
     }
-    if (pairs + stretches[best.stretch].count > most) continue;
-    pairs += stretches[best.stretch].count;
+    const Stretch& stretch = stretches[best.stretch];
+    if (pairs + stretch.count > limits.pairs || bytes + stretch.bytes > limits.bytes) continue;
+    pairs += stretch.count;
+    bytes += stretch.bytes;
     taken[best.stretch] = true;
     sum += stretches[best.stretch].information;
   }

@@ -4,13 +4,32 @@
 #define CAMGYRO_ESTIMATOR_INFORMATIVE_PAIRS_H_
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
+#include "core/recording.h"
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
 
-// At most `most` of the pairs, in their order: those of the stretches of a second that tell most
+// What a refinement may take.
+struct PairLimits {
+  size_t pairs = std::numeric_limits<size_t>::max();
+  double bytes = std::numeric_limits<double>::infinity();  // sum of RefinementBytes
+};
+
+// What a pair takes of memory in a refinement, about: for each match its residual's derivatives, by
+// what all pairs share, by the pair's direction and bend, and by the rates of the gyro from its
+// first row to its last, twice while Ceres appends its damping; and the match itself some times.
+// (heaptrack, one minute of walking with 150 tracks, pairs 0.17 s apart: 434 bytes for the
+// derivatives once. docs/lab/performance.md has what comes out.)
+double RefinementBytes(const TimedPair& pair, const PairGraphOptions& options);
+
+// What a recording takes of memory with its outline, about.
+double BytesOf(const Recording& recording);
+
+// Pairs within the limits, in their order: those of the stretches of a second that tell most
 // together.
 //
 // Everything that is calibrated shows in how the picture turns: focal length, principal point and
@@ -22,7 +41,9 @@ namespace camgyro {
 // delay_s: of the clocks, about. Source: Schneider et al., "Observability-aware self-calibration of
 // visual and inertial sensors for ego-motion estimation", IEEE Sensors 2019, whose measure is that
 // of all parameters.
-std::vector<TimedPair> InformativePairs(const EstimationInput& input, double delay_s, size_t most);
+std::vector<TimedPair> InformativePairs(const EstimationInput& input, double delay_s,
+                                        const PairLimits& limits,
+                                        const PairGraphOptions& options = {});
 
 }  // namespace camgyro
 

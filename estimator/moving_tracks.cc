@@ -130,13 +130,12 @@ std::vector<TimedPair> WithoutTracks(const std::vector<TimedPair>& pairs,
   return kept;
 }
 
-Result<StillFit> FitWhatIsStill(const EstimationInput& input, std::vector<TimedPair> pairs,
+Result<StillFit> FitWhatIsStill(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                                 const PairGraphOptions& options, const FitOfPairs& fit) {
   Result<Refined> first = fit(pairs, nullptr);
   if (!first) return tl::unexpected(first.error());
   StillFit still;
   still.fit = *std::move(first);
-  still.pairs = pairs;
   if (pairs.empty() || !ResidualOf(pairs.front(), options).facts().has_direction ||
       options.robust_threshold <= 0.0) {
     return still;

@@ -58,7 +58,7 @@ std::vector<TimedPair> WithoutTracks(const std::vector<TimedPair>& pairs,
 // A fit without the tracks that move.
 struct StillFit {
   Refined fit;
-  std::vector<TimedPair> pairs;  // of the last fit
+  std::vector<TimedPair> pairs;  // of the last fit; empty if nothing was left out
   int tracks = 0, moving = 0;
 };
 // The tracks are tested under a fit of all pairs, and again under that of those at rest, until nine
@@ -69,7 +69,7 @@ struct StillFit {
 using FitOfPairs =
     std::function<Result<Refined>(const std::vector<TimedPair>& pairs, const Refined* before)>;
 constexpr int kMostTests = 3;
-Result<StillFit> FitWhatIsStill(const EstimationInput& input, std::vector<TimedPair> pairs,
+Result<StillFit> FitWhatIsStill(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                                 const PairGraphOptions& options, const FitOfPairs& fit);
 
 }  // namespace camgyro

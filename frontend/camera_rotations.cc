@@ -13,7 +13,7 @@ namespace camgyro {
 namespace {
 
 constexpr double kPairS = 0.1;
-constexpr int kMinPairs = 30;  // the start asks for 20
+constexpr size_t kMinPairs = 30;  // the start asks for 20
 
 // A motion is followed from one focal length to the next if these are no further apart (log), and
 // searched anew at every fifth: a wrong one is not followed for long.
@@ -22,24 +22,33 @@ constexpr size_t kSearchEvery = 5;
 
 }  // namespace
 
-std::vector<FramePair> PairsForRotations(const Recording& recording) {
-  if (!recording.matches.empty()) return recording.matches;
+std::vector<FramePair> PairsForRotations(const Recording& recording, size_t max_pairs) {
+  std::vector<FramePair> pairs;
+  if (!recording.matches.empty()) {
+    for (const size_t i : SpreadIndices(recording.matches.size(), max_pairs)) {
+      pairs.push_back(recording.matches[i]);
+    }
+    return pairs;
+  }
   const double interval_s = MedianInterval(recording.frames);
   if (!(interval_s > 0.0)) return {};
-  const int longest = std::max(1, static_cast<int>(recording.tracks.size()) / kMinPairs);
-  const int gap = std::clamp(static_cast<int>(std::lround(kPairS / interval_s)), 1, longest);
-  std::vector<FramePair> chain;
-  for (FramePair& pair : PairsFromTracks(recording.tracks, gap)) {
-    if (pair.frame_a % gap == 0) chain.push_back(std::move(pair));
+  const size_t frames = recording.tracks.size();
+  const size_t longest = std::max<size_t>(1, frames / kMinPairs);
+  const size_t gap =
+      std::clamp(static_cast<size_t>(std::lround(kPairS / interval_s)), size_t{1}, longest);
+  for (const size_t i : SpreadIndices(frames > gap ? (frames - 1) / gap : 0, max_pairs)) {
+    const size_t a = i * gap, b = a + gap;
+    pairs.push_back({static_cast<int>(a), static_cast<int>(b),
+                     MatchesBetween(recording.tracks[a], recording.tracks[b])});
   }
-  return chain;
+  return pairs;
 }
 
-std::vector<FramePair> SpreadPairs(const std::vector<FramePair>& pairs, size_t max_pairs) {
-  if (pairs.size() <= max_pairs) return pairs;
-  std::vector<FramePair> spread;
-  spread.reserve(max_pairs);
-  for (size_t i = 0; i < max_pairs; ++i) spread.push_back(pairs[i * pairs.size() / max_pairs]);
+std::vector<size_t> SpreadIndices(size_t count, size_t most) {
+  std::vector<size_t> spread(std::min(count, most));
+  for (size_t i = 0; i < spread.size(); ++i) {
+    spread[i] = count <= most ? i : i * count / most;
+  }
   return spread;
 }
 

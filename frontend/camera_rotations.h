@@ -2,6 +2,8 @@
 #ifndef CAMGYRO_FRONTEND_CAMERA_ROTATIONS_H_
 #define CAMGYRO_FRONTEND_CAMERA_ROTATIONS_H_
 
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "core/recording.h"
@@ -18,10 +20,12 @@ namespace camgyro {
 //   delay, error [ms]           -0.05   -0.06    0.03    0.01   -0.09   -0.12
 //   its sigma [ms]               0.22    0.12    0.09    0.09    0.09    0.10
 //   karma: explained [%]         67      75      89      61      88      -
-std::vector<FramePair> PairsForRotations(const Recording& recording);
-
 // At most `max_pairs` of them, evenly spread.
-std::vector<FramePair> SpreadPairs(const std::vector<FramePair>& pairs, size_t max_pairs);
+std::vector<FramePair> PairsForRotations(const Recording& recording,
+                                         size_t max_pairs = std::numeric_limits<size_t>::max());
+
+// At most `most` of the numbers below `count`, evenly spread.
+std::vector<size_t> SpreadIndices(size_t count, size_t most);
 
 // EstimateCameraRotation (two_view_rotation.h) of each pair with the recording's declared lens (the
 // centre of the picture where it declares no principal point), and each of these focal lengths

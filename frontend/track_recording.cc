@@ -148,10 +148,18 @@ bool ShowsNothing(const cv::Mat& gray) {
 ImageMotion MeasureImageMotion(const Recording& recording) {
   ImageMotion motion;
   std::vector<double> matches, lengths;
-  for (const FramePair& pair :
-       recording.matches.empty() ? PairsFromTracks(recording.tracks, 1) : recording.matches) {
-    matches.push_back(static_cast<double>(pair.matches.size()));
-    for (const Match& match : pair.matches) lengths.push_back((match.px_b - match.px_a).norm());
+  const auto add = [&](const std::vector<Match>& of_pair) {
+    matches.push_back(static_cast<double>(of_pair.size()));
+    for (const Match& match : of_pair) lengths.push_back((match.px_b - match.px_a).norm());
+  };
+  if (recording.matches.empty()) {
+    const auto& tracks = recording.tracks;
+    size_t count = 0;
+    for (size_t b = 1; b < tracks.size(); ++b) count += CountMatches(tracks[b - 1], tracks[b]);
+    lengths.reserve(count);  // a hundred megabytes in an hour: a vector that grows takes twice that
+    for (size_t b = 1; b < tracks.size(); ++b) add(MatchesBetween(tracks[b - 1], tracks[b]));
+  } else {
+    for (const FramePair& pair : recording.matches) add(pair.matches);
   }
   motion.pairs = matches.size();
   motion.total_matches = lengths.size();

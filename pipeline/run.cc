@@ -26,7 +26,7 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
 }
 
 CameraRotationsAtFocals RotationsFrom(const Recording& recording, size_t max_pairs) {
-  return [pairs = SpreadPairs(PairsForRotations(recording), max_pairs),
+  return [pairs = PairsForRotations(recording, max_pairs),
           camera = recording.camera](const std::vector<double>& focals_px) {
     return CameraRotationsOf(pairs, camera, focals_px);
   };

@@ -40,9 +40,9 @@ Gaps FindGaps(const std::vector<Stamped>& items, int64_t origin_ns, const Known&
   return gaps;
 }
 
-double PairMotion(const FramePair& pair) {
+double MotionOf(const std::vector<Match>& matches) {
   std::vector<double> motion;
-  for (const Match& match : pair.matches) motion.push_back((match.px_b - match.px_a).norm());
+  for (const Match& match : matches) motion.push_back((match.px_b - match.px_a).norm());
   return motion.empty() ? 0.0 : MedianInPlace(&motion);
 }
 
@@ -54,24 +54,37 @@ constexpr size_t kFewestRepeated = 8;  // matches that show it
 // Frames that show the picture of the frame before, one or several in a row, while the camera moves
 // before and after.
 std::vector<int> RepeatedPictures(const Recording& recording) {
-  std::vector<FramePair> pairs =
-      recording.matches.empty() ? PairsFromTracks(recording.tracks, 1) : recording.matches;
-  const auto apart = [](const FramePair& pair) { return pair.frame_b != pair.frame_a + 1; };
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), apart), pairs.end());
-  std::vector<double> motion;
-  for (const FramePair& pair : pairs) motion.push_back(PairMotion(pair));
+  struct Step {
+    int frame_b = 0;
+    size_t matches = 0;
+    double motion_px = 0.0;
+  };
+  std::vector<Step> steps;  // of neighbours
+  const auto add = [&](int frame_b, const std::vector<Match>& matches) {
+    steps.push_back({frame_b, matches.size(), MotionOf(matches)});
+  };
+  if (recording.matches.empty()) {
+    for (size_t b = 1; b < recording.tracks.size(); ++b) {
+      add(static_cast<int>(b), MatchesBetween(recording.tracks[b - 1], recording.tracks[b]));
+    }
+  } else {
+    for (const FramePair& pair : recording.matches) {
+      if (pair.frame_b == pair.frame_a + 1) add(pair.frame_b, pair.matches);
+    }
+  }
   std::vector<int> repeated;
-  for (size_t i = 1; i + 1 < motion.size(); ++i) {
-    if (!(motion[i - 1] > kMovingPx)) continue;
-    const double still_px = kRepeatedMotion * motion[i - 1];
+  for (size_t i = 1; i + 1 < steps.size(); ++i) {
+    if (!(steps[i - 1].motion_px > kMovingPx)) continue;
+    const double still_px = kRepeatedMotion * steps[i - 1].motion_px;
     size_t end = i;  // of the pairs that do not move
-    while (end < motion.size() && pairs[end].matches.size() >= kFewestRepeated &&
-           motion[end] < still_px) {
+    while (end < steps.size() && steps[end].matches >= kFewestRepeated &&
+           steps[end].motion_px < still_px) {
       ++end;
     }
-    if (end == i || end == motion.size() || !(motion[end] > kMovingPx)) continue;
+    if (end == i || end == steps.size() || !(steps[end].motion_px > kMovingPx)) continue;
     for (; i < end; ++i) {
-      if (motion[i] < kRepeatedMotion * motion[end]) repeated.push_back(pairs[i].frame_b);
+      if (steps[i].motion_px < kRepeatedMotion * steps[end].motion_px)
+        repeated.push_back(steps[i].frame_b);
     }
   }
   return repeated;

@@ -102,7 +102,7 @@ void CalibrateWith(const Calibration& found, const LoopInput& input,
   with.given_start = diagnosis->before->start;
   with.from = found;
   // Once all frames may be seen, those of the report, too.
-  const EstimationInput all = MakeEstimationInput(recording, SelectPairs(recording));
+  const EstimationInput all = OutlineOf(recording, SelectPairs(recording));
   PlaceDelaySteps(recording, all, all.pairs, kStepMarginBlocks * diagnosis->block_s, input.noise,
                   input.graph, &*with.from);
   with.online = false;

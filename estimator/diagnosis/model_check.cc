@@ -73,12 +73,8 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
   t.candidates = std::move(with_columns);
   t.usual = UsualOf(t.candidates, recording, model, device);
 
-  const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
-  Shares shares = MakeShares(recording, input);
-  if (!recording.HasOnlyAttitudes()) {
-    Thin(kMostFitPairs, &shares.fit);
-    Thin(kMostFitPairs, &shares.choice);
-  }
+  const EstimationInput input = OutlineOf(recording, SelectPairs(recording));
+  const Shares shares = MakeShares(recording, input, {kMostFitPairs, kMostFitPairs});
   const PairGraphOptions graph = GraphOptionsFor(recording, report.start, options);
   const auto scores_of = [&](const std::vector<PairBlock>& blocks) {
     return ComputeScores(input, blocks, model, set, report.quality.noise_px, graph);

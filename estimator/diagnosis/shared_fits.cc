@@ -13,23 +13,20 @@ namespace camgyro {
 SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
     : in_(in),
       options_(options),
-      input_(MakeEstimationInput(*in.recording, SelectPairs(*in.recording))),
-      shares_(MakeShares(*in.recording, input_)) {
-  const PairSelection near = SelectPairs(*in.recording, kNearGap);
-  map_pairs_ = MakeShares(*in.recording, MakeEstimationInput(*in.recording, near)).choice;
+      input_(OutlineOf(*in.recording, SelectPairs(*in.recording))),
+      shares_(MakeShares(*in.recording, input_, {kMostFitPairs, kMostChoicePairs})) {
+  const auto shares_of = [&](const PairSelection& selection, const ShareLimits& limits) {
+    return MakeShares(*in.recording, OutlineOf(*in.recording, selection), limits);
+  };
+  map_pairs_ =
+      shares_of(SelectPairs(*in.recording, kNearGap), {kMostFitPairs, kMostChoicePairs}).choice;
   if (in.recording->HasOnlyAttitudes()) return;
   // As far apart as the others, so that no two of them share noise.
   const int stride = SelectPairs(*in.recording).stride;
-  Shares nearest =
-      MakeShares(*in.recording, MakeEstimationInput(*in.recording, {kNearestGap, stride}));
-  Thin(kMostFitPairs, &nearest.fit);
-  Thin(kMostFitPairs, &nearest.choice);
+  const Shares nearest = shares_of({kNearestGap, stride}, {kMostFitPairs, kMostFitPairs});
   near_pairs_ = Joined(nearest.fit);
   const std::vector<TimedPair> choice = Joined(nearest.choice);
   near_pairs_.insert(near_pairs_.end(), choice.begin(), choice.end());
-  Thin(kMostFitPairs, &shares_.fit);
-  Thin(kMostChoicePairs, &shares_.choice);
-  Thin(kMostChoicePairs, &map_pairs_);
 }
 
 std::vector<PairBlock> SharedFits::SeenBlocks() const {

@@ -19,6 +19,7 @@ class SharedFits {
 
   const LoopInput& in() const { return in_; }
   const DiagnoseOptions& options() const { return options_; }
+  // Its pairs have no matches (OutlineOf); those of the shares have.
   const EstimationInput& input() const { return input_; }
   const Shares& shares() const { return shares_; }
   // The choice share's frames in pairs that are near.

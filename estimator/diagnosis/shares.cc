@@ -15,9 +15,30 @@ namespace {
 enum Share { kFit, kChoice, kReport };
 constexpr Share kDeal[] = {kFit, kChoice, kFit, kChoice, kReport};
 
+// Leaves every n-th pair, so that at most `most` stay.
+void Thin(size_t most, std::vector<PairBlock>* blocks) {
+  size_t pairs = 0;
+  for (const PairBlock& block : *blocks) pairs += block.size();
+  if (pairs <= most) return;
+  const size_t stride = (pairs + most - 1) / most;
+  size_t at = 0;
+  for (PairBlock& block : *blocks) {
+    PairBlock kept;
+    for (TimedPair& pair : block) {
+      if (at++ % stride == 0) kept.push_back(std::move(pair));
+    }
+    block = std::move(kept);
+  }
+}
+
+void AddMatches(const Recording& recording, std::vector<PairBlock>* blocks) {
+  for (PairBlock& block : *blocks) AddMatches(recording, &block);
+}
+
 }  // namespace
 
-Shares MakeShares(const Recording& recording, const EstimationInput& input) {
+Shares MakeShares(const Recording& recording, const EstimationInput& input,
+                  const ShareLimits& limits) {
   Shares shares;
   if (input.pairs.empty()) return shares;
   // Of the frames, so that pairs of any gap have the same blocks.
@@ -60,33 +81,25 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input) {
       report_all.resize(shares.report.size());
       report_all.back().push_back(pair);
       std::vector<Match>& matches = blocks.back().back().matches;
+      matches = MatchesOf(recording, pair);
       matches.erase(
           std::remove_if(matches.begin(), matches.end(),
                          [&](const Match& match) { return seen.count(match.track_id) > 0; }),
           matches.end());
-      usable += blocks.back().back().matches.size() >= static_cast<size_t>(PairGraph::kMinMatches)
-                    ? 1
-                    : 0;
+      usable += matches.size() >= static_cast<size_t>(PairGraph::kMinMatches) ? 1 : 0;
     }
   }
   if (has_tracks && usable < kLeastReportPairs && usable * 2 < Joined(report_all).size()) {
     shares.report = std::move(report_all);
     shares.report_shares_tracks = true;
   }
+  if (recording.HasOnlyAttitudes()) return shares;
+  Thin(limits.fit, &shares.fit);
+  Thin(limits.choice, &shares.choice);
+  AddMatches(recording, &shares.fit);
+  AddMatches(recording, &shares.choice);
+  if (!has_tracks || shares.report_shares_tracks) AddMatches(recording, &shares.report);
   return shares;
-}
-
-void Thin(size_t most, std::vector<PairBlock>* blocks) {
-  const size_t stride = (Joined(*blocks).size() + most - 1) / most;
-  if (stride < 2) return;
-  size_t at = 0;
-  for (PairBlock& block : *blocks) {
-    PairBlock kept;
-    for (TimedPair& pair : block) {
-      if (at++ % stride == 0) kept.push_back(std::move(pair));
-    }
-    block = std::move(kept);
-  }
 }
 
 std::vector<TimedPair> Joined(const std::vector<PairBlock>& blocks) {

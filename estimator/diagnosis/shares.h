@@ -2,6 +2,8 @@
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_SHARES_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_SHARES_H_
 
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "core/recording.h"
@@ -24,12 +26,17 @@ struct Shares {
   bool report_shares_tracks = false;
 };
 
-// Short blocks, so that what changes with time is seen by all shares: 1/40 of the recording, within
-// 0.2 and 3 s, at least 6 frames.
-Shares MakeShares(const Recording& recording, const EstimationInput& input);
+// How many pairs of recordings with pixels stay in a share: every n-th.
+struct ShareLimits {
+  static constexpr size_t kAll = std::numeric_limits<size_t>::max();
+  size_t fit = kAll, choice = kAll;
+};
 
-// Leaves every n-th pair, so that at most `most` stay.
-void Thin(size_t most, std::vector<PairBlock>* blocks);
+// Short blocks, so that what changes with time is seen by all shares: 1/40 of the recording, within
+// 0.2 and 3 s, at least 6 frames. `input` may be an outline (OutlineOf): pairs that stay have their
+// matches.
+Shares MakeShares(const Recording& recording, const EstimationInput& input,
+                  const ShareLimits& limits = {});
 
 std::vector<TimedPair> Joined(const std::vector<PairBlock>& blocks);
 

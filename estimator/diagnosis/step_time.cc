@@ -72,7 +72,8 @@ bool PlaceDelaySteps(const Recording& recording, const EstimationInput& input,
     }
     std::vector<PairCosts> costs(near.size());
     ParallelFor(near.size(), [&](size_t i) {
-      const TimedPair& pair = *near[i];
+      TimedPair pair = *near[i];
+      if (pair.matches.empty()) pair.matches = MatchesOf(recording, pair);
       costs[i] = {pair.time_a_s, pair.time_b_s, chi2(pair, last_s),
                   chi2(pair, 0.5 * (pair.time_a_s + pair.time_b_s)), chi2(pair, first_s)};
     });

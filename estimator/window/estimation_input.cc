@@ -20,8 +20,8 @@ PairSelection SelectPairs(const Recording& recording, int longest_gap, int least
   }
   const auto matches = [&](int gap) {
     size_t count = 0;
-    for (const FramePair& pair : PairsFromTracks(recording.tracks, gap)) {
-      count += pair.matches.size();
+    for (size_t b = static_cast<size_t>(gap); b < recording.tracks.size(); ++b) {
+      count += CountMatches(recording.tracks[b - static_cast<size_t>(gap)], recording.tracks[b]);
     }
     return static_cast<double>(count);
   };
@@ -47,9 +47,28 @@ std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs) {
 }
 
 EstimationInput MakeEstimationInput(const Recording& recording, const PairSelection& selection) {
+  EstimationInput input = OutlineOf(recording, selection);
+  AddMatches(recording, &input.pairs);
+  return input;
+}
+
+std::vector<Match> MatchesOf(const Recording& recording, const TimedPair& pair) {
+  if (pair.num_matches == 0) return {};
+  // Pairs of a file are taken as they are, so that their numbers are their places.
+  if (!recording.matches.empty()) return recording.matches[static_cast<size_t>(pair.id)].matches;
+  return MatchesBetween(recording.tracks[static_cast<size_t>(pair.frame_a)],
+                        recording.tracks[static_cast<size_t>(pair.frame_b)]);
+}
+
+void AddMatches(const Recording& recording, std::vector<TimedPair>* pairs) {
+  for (TimedPair& pair : *pairs) pair.matches = MatchesOf(recording, pair);
+}
+
+EstimationInput OutlineOf(const Recording& recording, const PairSelection& selection) {
   EstimationInput input;
   input.origin_ns = recording.gyro.front().stamp_ns;
   const std::vector<bool> saturated = FindSaturated(recording.gyro);
+  input.rates.reserve(recording.gyro.size());
   for (const GyroSample& sample : recording.gyro) {
     input.rates.push_back({SecondsSince(input.origin_ns, sample.stamp_ns), sample.omega_gyro_rad_s,
                            saturated[input.rates.size()]});
@@ -68,13 +87,16 @@ EstimationInput MakeEstimationInput(const Recording& recording, const PairSelect
     input.pairs.push_back(std::move(pair));
     return input.pairs.back();
   };
-  if (!recording.matches.empty() || !recording.tracks.empty()) {
-    const bool tracked = recording.matches.empty();
-    const std::vector<FramePair> pairs =
-        tracked ? PairsFromTracks(recording.tracks, selection.gap) : recording.matches;
-    for (const FramePair& pair : pairs) {
-      if (tracked && pair.frame_a % selection.stride != 0) continue;
-      add(pair.frame_a, pair.frame_b).matches = pair.matches;
+  if (!recording.matches.empty()) {
+    for (const FramePair& pair : recording.matches) {
+      add(pair.frame_a, pair.frame_b).num_matches = pair.matches.size();
+    }
+  } else if (!recording.tracks.empty()) {
+    const int n = static_cast<int>(recording.tracks.size());
+    for (int a = 0; a + selection.gap < n; a += selection.stride) {
+      const int b = a + selection.gap;
+      add(a, b).num_matches = CountMatches(recording.tracks[static_cast<size_t>(a)],
+                                           recording.tracks[static_cast<size_t>(b)]);
     }
   } else {
     const int n = static_cast<int>(recording.q_cam_world.size());

@@ -41,6 +41,12 @@ PairSelection SelectPairs(const Recording& recording, int longest_gap = 10, int 
 EstimationInput MakeEstimationInput(const Recording& recording,
                                     const PairSelection& selection = {});
 
+// The same without the matches, which of all pairs of an hour take more memory than its tracks:
+// pairs know how many they are, and AddMatches makes them for those that were chosen.
+EstimationInput OutlineOf(const Recording& recording, const PairSelection& selection = {});
+std::vector<Match> MatchesOf(const Recording& recording, const TimedPair& pair);
+void AddMatches(const Recording& recording, std::vector<TimedPair>* pairs);
+
 // Pairs of which none begins before the one before ends, for estimators that go along.
 std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs);
 

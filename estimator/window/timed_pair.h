@@ -26,7 +26,8 @@ struct TimedPair {
   double time_a_s = 0.0, time_b_s = 0.0;
   double exposure_a_s = std::numeric_limits<double>::quiet_NaN();  // NaN: not recorded
   double exposure_b_s = std::numeric_limits<double>::quiet_NaN();
-  std::vector<Match> matches;  // empty for rotations
+  std::vector<Match> matches;  // empty for rotations, and of an outline (OutlineOf)
+  size_t num_matches = 0;      // of the recording, also where `matches` is empty
   CameraRotation rotation;     // of recordings with attitudes
 
   FrameTime first() const { return {time_a_s, exposure_a_s}; }

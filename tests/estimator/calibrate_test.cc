@@ -20,7 +20,7 @@ using simulation::SimulateTracks;
 
 // Rotations from the pictures (frontend/two_view_rotation.h), as the command line makes them.
 CameraRotationsAtFocals RotationsOf(const Recording& recording) {
-  return [pairs = SpreadPairs(PairsForRotations(recording), 100),
+  return [pairs = PairsForRotations(recording, 100),
           camera = recording.camera](const std::vector<double>& focals_px) {
     return CameraRotationsOf(pairs, camera, focals_px);
   };
@@ -85,6 +85,14 @@ TEST(CalibrateRecording, RefinesTheMostInformativePairsOfALongOne) {
     EXPECT_THAT(some->notes, ::testing::ElementsAre(::testing::HasSubstr("recording is long")));
     EXPECT_LE(some->quality.pairs, all->quality.pairs / 3);
     EXPECT_GE(some->quality.pairs, all->quality.pairs / 5);
+    // The same by the memory that they take.
+    options.most_refined_pairs = 9000;
+    options.most_bytes = 0.0;
+    options.least_refined_bytes = 5e6;
+    const auto few = CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+    ASSERT_TRUE(few.has_value()) << few.error().message;
+    EXPECT_THAT(few->notes, ::testing::ElementsAre(::testing::HasSubstr("recording is long")));
+    EXPECT_LT(few->quality.matches, 5000);
     const StateVector wider = some->calibration.sigma().cwiseQuotient(all->calibration.sigma());
     EXPECT_GT(wider.mean(), 1.0) << wider.transpose();
     // Three sigmas to one are those of a ninth of the pairs, chosen at random.
@@ -139,7 +147,7 @@ TEST(CalibrateRecording, TakesAClockThatRunsFastIntoTheModel) {
   scenario.tracks.count = 50;
   scenario.effects.clock_skew.ppm = 8000.0;
   const Simulated s = SimulateTracks(scenario).value();
-  const auto rotations = [pairs = SpreadPairs(PairsForRotations(s.recording), 400),
+  const auto rotations = [pairs = PairsForRotations(s.recording, 400),
                           camera = s.recording.camera](const std::vector<double>& focals_px) {
     return CameraRotationsOf(pairs, camera, focals_px);
   };

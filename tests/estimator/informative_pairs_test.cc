@@ -24,7 +24,7 @@ EstimationInput Turns() {
     pair.id = i;
     pair.time_a_s = 0.1 * i;
     pair.time_b_s = 0.1 * (i + 1);
-    pair.matches.resize(50);
+    pair.num_matches = 50;
     input.pairs.push_back(pair);
   }
   return input;
@@ -37,12 +37,12 @@ int CountWithin(const std::vector<TimedPair>& pairs, double from_s, double to_s)
 }
 
 TEST(InformativePairs, AreAllOfAShortRecording) {
-  EXPECT_EQ(InformativePairs(Turns(), 0.0, 990).size(), 990u);
+  EXPECT_EQ(InformativePairs(Turns(), 0.0, {990}).size(), 990u);
 }
 
 // Both seconds about y, though there are few of them, and nothing of the rest.
 TEST(InformativePairs, AreWhereTheCameraTurnsAboutEveryAxis) {
-  const std::vector<TimedPair> kept = InformativePairs(Turns(), 0.0, 80);
+  const std::vector<TimedPair> kept = InformativePairs(Turns(), 0.0, {80});
   EXPECT_LE(kept.size(), 80u);
   EXPECT_GE(kept.size(), 60u);
   EXPECT_GE(CountWithin(kept, 70.0, 72.0), 15);
@@ -50,9 +50,37 @@ TEST(InformativePairs, AreWhereTheCameraTurnsAboutEveryAxis) {
   for (size_t i = 1; i < kept.size(); ++i) EXPECT_GT(kept[i].id, kept[i - 1].id);
 }
 
+// Of memory, too: a tenth of what all take leaves a tenth of the pairs, as they are alike, in whole
+// stretches of ten.
+TEST(InformativePairs, StayWithinTheirMemory) {
+  const EstimationInput input = Turns();
+  double all = 0.0;
+  for (const TimedPair& pair : input.pairs) all += RefinementBytes(pair, {});
+  // Of a match: twice 20 + 3 (4 + 0.1 s / 0.025 s) derivatives, and four times itself.
+  EXPECT_NEAR(all, 990.0 * 50.0 * (2.0 * 44.0 * 8.0 + 4.0 * sizeof(Match)), 1e-6 * all);
+  PairLimits limits;
+  limits.bytes = all;
+  EXPECT_EQ(InformativePairs(input, 0.0, limits).size(), 990u);
+  limits.bytes = 0.1 * all;
+  const std::vector<TimedPair> kept = InformativePairs(input, 0.0, limits);
+  EXPECT_LE(kept.size(), 99u);
+  EXPECT_GE(kept.size(), 80u);
+  double taken = 0.0;
+  for (const TimedPair& pair : kept) taken += RefinementBytes(pair, {});
+  EXPECT_LE(taken, limits.bytes);
+}
+
+TEST(BytesOfRecording, CountsPointsAndSamples) {
+  Recording recording;
+  recording.tracks.assign(1000, std::vector<TrackedPoint>(150));
+  EXPECT_EQ(BytesOf(recording), 32.0 * 150000.0);
+  recording.gyro.resize(100);
+  EXPECT_GT(BytesOf(recording), 32.0 * 150000.0 + 100.0 * sizeof(GyroSample));
+}
+
 // The frames' stamps are 5 s early.
 TEST(InformativePairs, KnowTheDelay) {
-  const std::vector<TimedPair> kept = InformativePairs(Turns(), 5.0, 80);
+  const std::vector<TimedPair> kept = InformativePairs(Turns(), 5.0, {80});
   EXPECT_GE(CountWithin(kept, 65.0, 67.0), 15);
   EXPECT_GE(CountWithin(kept, 24.0, 36.0), 40);
 }

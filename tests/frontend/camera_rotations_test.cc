@@ -46,6 +46,29 @@ TEST(CameraRotationsOf, FollowsWhatASearchFinds) {
   EXPECT_GE(same, 0.95 * all);
 }
 
+TEST(PairsForRotations, AreChosenBeforeTheirMatchesAreMade) {
+  Recording recording;
+  for (int i = 0; i < 301; ++i) {
+    recording.frames.emplace_back().stamp_ns = 33'000'000LL * i;
+    recording.tracks.push_back({{1, {1.0 * i, 0.0}}, {2, {0.0, 1.0 * i}}});
+  }
+  const std::vector<FramePair> all = PairsForRotations(recording);  // 0.1 s: three frames
+  ASSERT_EQ(all.size(), 100u);
+  const std::vector<FramePair> some = PairsForRotations(recording, 30);
+  ASSERT_EQ(some.size(), 30u);
+  for (size_t i = 0; i < some.size(); ++i) {
+    const FramePair& same = all[i * 100 / 30];
+    EXPECT_EQ(some[i].frame_a, same.frame_a);
+    EXPECT_EQ(some[i].frame_b, same.frame_a + 3);
+    ASSERT_EQ(some[i].matches.size(), 2u);
+    EXPECT_EQ(some[i].matches[0].px_b.x(), some[i].frame_b);
+  }
+  recording.matches = all;
+  recording.matches.resize(50);
+  EXPECT_EQ(PairsForRotations(recording).size(), 50u);
+  EXPECT_EQ(PairsForRotations(recording, 10)[3].frame_a, all[15].frame_a);
+}
+
 TEST(CameraRotationsOf, LeavesOutPairsThatHaveNone) {
   TwoViewScene scene;
   scene.p_a = Eigen::Vector3d(0.08, -0.02, 0.05);

@@ -37,8 +37,9 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
       SummarySection(report, attitudes), MotionSection(recording, report, attitudes),
       ConvergenceSection(report), DelaySection(report.start), RatesSection(recording, calibration)};
   if (!attitudes) {
-    const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
-    const std::vector<TimedPair> pairs = EvenlyChosen(input.pairs);
+    const EstimationInput input = OutlineOf(recording, SelectPairs(recording));
+    std::vector<TimedPair> pairs = EvenlyChosen(input.pairs);
+    AddMatches(recording, &pairs);
     PairGraphOptions options;
     options.match_noise = recording.match_noise;
     options.residual = report.residual;

@@ -39,15 +39,20 @@ struct RatePoint {
 std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
                                                   const Calibration& calibration) {
   std::vector<CameraRotation> rotations;
-  std::vector<FramePair> pairs;
-  for (TimedPair& pair : MakeEstimationInput(recording).pairs) {
-    if (pair.matches.empty()) {
+  std::vector<TimedPair> neighbours;
+  for (const TimedPair& pair : OutlineOf(recording).pairs) {
+    if (pair.num_matches == 0) {
       rotations.push_back(pair.rotation);
     } else {
-      pairs.push_back({pair.frame_a, pair.frame_b, std::move(pair.matches)});
+      neighbours.push_back(pair);
     }
   }
-  if (pairs.empty()) return rotations;
+  if (neighbours.empty()) return rotations;
+  std::vector<FramePair> pairs;
+  for (const size_t i : SpreadIndices(neighbours.size(), kMaxCameraPoints)) {
+    const TimedPair& pair = neighbours[i];
+    pairs.push_back({pair.frame_a, pair.frame_b, MatchesOf(recording, pair)});
+  }
   CameraGuess camera = recording.camera;
   const LensParameters lens = calibration.FullLens();
   camera.aspect_ratio = lens[kAspect];
@@ -57,7 +62,7 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
       StandardDistortion(calibration.distortion_model, lens, size_px);
   camera.distortion_model = distortion.model;
   camera.distortion.assign(distortion.k.data(), distortion.k.data() + 4);
-  return CameraRotationsOf(SpreadPairs(pairs, kMaxCameraPoints), camera, {lens[kFocal]}).front();
+  return CameraRotationsOf(pairs, camera, {lens[kFocal]}).front();
 }
 
 std::vector<RatePoint> RatePoints(const Recording& recording, const Calibration& calibration) {

@@ -48,6 +48,36 @@ TEST(EstimationInput, HoldsPairsAndRatesOnOneTimeAxis) {
             1e-12);
 }
 
+// An outline is the input without its matches, which are made pair by pair.
+TEST(EstimationInput, OutlineKnowsTheNumbersAndMakesTheMatchesOfChosenPairs) {
+  const Simulated s = SimulateTracks(ShortScenario(1.0)).value();
+  Recording with_matches = s.recording;
+  with_matches.matches = PairsFromTracks(s.recording.tracks, 2);
+  for (const Recording& recording : {s.recording, with_matches}) {
+    const PairSelection selection{3, 2};
+    const EstimationInput whole = MakeEstimationInput(recording, selection);
+    const EstimationInput outline = OutlineOf(recording, selection);
+    ASSERT_EQ(outline.pairs.size(), whole.pairs.size());
+    EXPECT_EQ(outline.rates.size(), whole.rates.size());
+    std::vector<TimedPair> chosen;
+    for (size_t i = 0; i < whole.pairs.size(); i += 5) {
+      EXPECT_TRUE(outline.pairs[i].matches.empty());
+      EXPECT_EQ(outline.pairs[i].num_matches, whole.pairs[i].matches.size());
+      chosen.push_back(outline.pairs[i]);
+    }
+    AddMatches(recording, &chosen);
+    for (size_t k = 0; k < chosen.size(); ++k) {
+      const TimedPair& expected = whole.pairs[5 * k];
+      EXPECT_EQ(chosen[k].frame_a, expected.frame_a);
+      EXPECT_EQ(chosen[k].frame_b, expected.frame_b);
+      ASSERT_EQ(chosen[k].matches.size(), expected.matches.size());
+      ASSERT_GT(expected.matches.size(), 10u);
+      EXPECT_EQ(chosen[k].matches[7].px_a, expected.matches[7].px_a);
+      EXPECT_EQ(chosen[k].matches[7].px_b, expected.matches[7].px_b);
+    }
+  }
+}
+
 TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
   Scenario scenario = ShortScenario(4.0);
   Simulated s = SimulateTracks(scenario).value();

@@ -25,7 +25,7 @@ Result<CalibrationReport> Calibrate(Recording* recording) {
     const auto tracked = TrackRecording({}, nullptr, nullptr, recording);
     if (!tracked) return tl::unexpected(tracked.error());
   }
-  const std::vector<FramePair> pairs = SpreadPairs(PairsForRotations(*recording), 400);
+  const std::vector<FramePair> pairs = PairsForRotations(*recording, 400);
   return CalibrateRecording(
       *recording,
       [&](const std::vector<double>& focals_px) {
