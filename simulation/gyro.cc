@@ -95,6 +95,34 @@ class AccelBias {
   double step_m_s2_;
 };
 
+// How late samples arrive, in their order: nothing overtakes. Its random numbers are its own, too.
+class Arrivals {
+ public:
+  explicit Arrivals(const Scenario& scenario) : options_(scenario.gyro) {
+    constexpr uint32_t kStream = 201;
+    std::seed_seq sequence{static_cast<uint32_t>(scenario.seed),
+                           static_cast<uint32_t>(scenario.seed >> 32), kStream};
+    random_.seed(sequence);
+  }
+
+  // Latency of the next sample, which was taken at this time [s].
+  double Next(double time_s) {
+    double late_s = options_.stamp_latency_s * latency_(random_);
+    const bool stalls = unit_(random_) * GyroOptions::kSamplesPerStall < 1.0;
+    const double stall_s = options_.stamp_stall_s * unit_(random_);
+    if (stalls) late_s += stall_s;
+    last_s_ = std::max(last_s_, time_s + late_s);
+    return last_s_ - time_s;
+  }
+
+ private:
+  const GyroOptions& options_;
+  std::mt19937_64 random_;
+  std::exponential_distribution<double> latency_;
+  std::uniform_real_distribution<double> unit_{0.0, 1.0};
+  double last_s_ = 0.0;
+};
+
 // What an accelerometer at the gyro feels, in the gyro frame [m/s^2].
 Vector3d SpecificForce(const Scenario& scenario, const Trajectory& trajectory, double time_s) {
   const Matrix3d R_gyro_cam = scenario.mount.q_gyro_cam.toRotationMatrix();
@@ -127,6 +155,7 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
   Element element(scenario, trajectory);
   Normal normal(random);
   AccelBias accel_bias(scenario);
+  Arrivals arrivals(scenario);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   SimulatedGyro result;
   Vector3d walk = Vector3d::Zero();
@@ -159,7 +188,7 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
 
     // Draws are the same whatever is switched on, so that recordings differ by the effect alone.
     const Vector3d accel_error = accel_bias.Next() + sigma_accel * normal.Vector();
-    const double jitter_s = options.stamp_jitter_s * normal();
+    const double jitter_s = options.stamp_jitter_s * normal() + arrivals.Next(time_s);
     if (unit(*random) < options.drop_fraction && i > 0 && i + 1 < count) continue;
     int64_t stamp_ns =
         sampled_ns + (i > 0 ? static_cast<int64_t>(std::llround(jitter_s * 1e9)) : 0);

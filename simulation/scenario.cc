@@ -107,6 +107,8 @@ void Read(YamlSection section, GyroOptions* gyro) {
   section.Read("bias_walk_rad_s2_rtHz", &gyro->bias_walk_rad_s2_rtHz, Range::kNotNegative);
   section.Read("averaged", &gyro->averaged);
   section.Read("stamp_jitter_s", &gyro->stamp_jitter_s, Range::kNotNegative);
+  section.Read("stamp_latency_s", &gyro->stamp_latency_s, Range::kNotNegative);
+  section.Read("stamp_stall_s", &gyro->stamp_stall_s, Range::kNotNegative);
   section.Read("drop_fraction", &gyro->drop_fraction, Range::kFraction);
   section.Read("quantum_rad_s", &gyro->quantum_rad_s, Range::kNotNegative);
   section.Read("accelerometer", &gyro->accelerometer);

@@ -93,6 +93,11 @@ struct GyroOptions {
   double bias_walk_rad_s2_rtHz = 1e-5;
   bool averaged = false;        // samples are means over their interval
   double stamp_jitter_s = 0.0;  // sigma; samples are even, stamps are not
+  // Stamps of arrival: a latency for each sample, exponential with this mean; one in
+  // kSamplesPerStall stalls for up to stamp_stall_s more, and holds up those behind it.
+  double stamp_latency_s = 0.0;
+  double stamp_stall_s = 0.0;
+  static constexpr int kSamplesPerStall = 200;
   double drop_fraction = 0.0;
   double quantum_rad_s = 0.0;  // 0: none
   bool accelerometer = true;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/time.h"
@@ -180,6 +181,40 @@ TEST(Gyro, StampsJitterAndDropButIncrease) {
   for (size_t i = 1; i < result.gyro.size(); ++i) {
     EXPECT_GT(result.gyro[i].stamp_ns, result.gyro[i - 1].stamp_ns);
   }
+}
+
+// Late by an exponential latency and, one in 200, by a stall; samples themselves stay as they were.
+TEST(Gyro, StampsOfArrival) {
+  Scenario scenario;
+  scenario.duration_s = 100.0;
+  const Tone tone(1.5, 2.0);
+  const SimulatedGyro clean = SampleGyro(scenario, tone);
+  scenario.gyro.stamp_latency_s = 1e-3;
+  const SimulatedGyro late = SampleGyro(scenario, tone);
+  scenario.gyro.stamp_stall_s = 0.03;
+  const SimulatedGyro stalled = SampleGyro(scenario, tone);
+  ASSERT_EQ(late.gyro.size(), clean.gyro.size());
+  ASSERT_EQ(stalled.gyro.size(), clean.gyro.size());
+  double sum = 0.0, longest = 0.0;
+  int held_up = 0;
+  for (size_t i = 0; i < clean.gyro.size(); ++i) {
+    EXPECT_EQ(stalled.gyro[i].omega_gyro_rad_s, clean.gyro[i].omega_gyro_rad_s);
+    const double usual = SecondsSince(clean.gyro[i].stamp_ns, late.gyro[i].stamp_ns);
+    const double all = SecondsSince(clean.gyro[i].stamp_ns, stalled.gyro[i].stamp_ns);
+    EXPECT_GE(usual, 0.0);
+    EXPECT_GE(all, usual);
+    sum += usual;
+    longest = std::max(longest, all);
+    if (all > usual + 1e-3) ++held_up;
+  }
+  const auto count = static_cast<double>(clean.gyro.size());
+  // 20,000 draws: the mean is known to 0.7 %. Waiting for the one before adds exp(-5) of it.
+  EXPECT_NEAR(sum / count, 1e-3, 0.04e-3);
+  EXPECT_GT(longest, 0.025);
+  EXPECT_LT(longest, 0.045);
+  // A stall of up to 6 periods holds up 3 samples in the mean, itself included, and there is one
+  // in 200.
+  EXPECT_NEAR(held_up / count, 3.0 / 200.0, 0.006);
 }
 
 // Specific force: gravity at rest, and the lever arm's centripetal part when the camera's point
