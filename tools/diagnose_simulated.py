@@ -221,8 +221,8 @@ def clean_cases(options):
         yield dict(kind="clean", name="clean", motion=motion, seed=seed, effects=[],
                    variant=" ".join((variant or ("plain",)) + ("%g px, %g %% outliers" % (
                        noise, 100 * wrong),)),
-                   scenario=[SOURCE + "/tools/scenarios/default.yaml", "seed=%d" % (1000 + seed),
-                             "duration_s=%g" % options.clean_duration, "motion.kind=" + motion,
+                   scenario=[SOURCE + "/tools/scenarios/motion_%s.yaml" % motion,
+                             "seed=%d" % (1000 + seed), "duration_s=%g" % options.clean_duration,
                              "tracks.noise_px=%g" % noise, "tracks.outlier_fraction=%g" % wrong,
                              *variant])
 
