@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/format.h"
 #include "core/robust_statistics.h"
 #include "core/time.h"
+#include "frontend/quantile_line.h"
 
 namespace camgyro {
 namespace {
@@ -16,9 +16,11 @@ constexpr size_t kFewestStamps = 40;
 constexpr size_t kSlopeLag = 32;      // samples; bridges bunches, mostly without a missing sample
 constexpr double kLookaheadS = 0.25;  // after which late samples have been caught up
 constexpr size_t kFewestAhead = 16;   // samples
-constexpr double kMissingPeriods = 0.6;   // rise of the envelope that is a missing sample
-constexpr double kScatterPeriods = 0.01;  // clean measured recordings: 0.003 and less
-constexpr double kScatterS = 50e-6;       // less turns no camera by a visible angle
+constexpr double kLongGapPeriods = 100.0;  // in a stream with missing samples, a rarity
+constexpr double kMostLongGaps = 0.01;     // of the intervals
+constexpr double kMissingPeriods = 0.6;    // rise of the envelope that is a missing sample
+constexpr double kScatterPeriods = 0.01;   // clean measured recordings: 0.003 and less
+constexpr double kScatterS = 50e-6;        // less turns no camera by a visible angle
 constexpr double kLatePeriods = 0.5;
 constexpr double kLateS = 5e-3;
 constexpr int kFewestLate = 3;            // samples
@@ -40,38 +42,6 @@ double Quantile(std::vector<double> values, double q) {
 // Half the width of the middle 68 %.
 double Scatter(const std::vector<double>& values) {
   return 0.5 * (Quantile(values, 0.84) - Quantile(values, 0.16));
-}
-
-struct Point {
-  double x = 0.0, y = 0.0;
-};
-struct Line {
-  double x0 = 0.0, y0 = 0.0, slope = 0.0;
-  double At(double x) const { return y0 + slope * (x - x0); }
-};
-
-// The line with a fraction `q` of the points below it, and the least sum of asymmetric absolute
-// distances (quantile regression). Exact: such a line goes through two of the points.
-Line QuantileLine(const std::vector<Point>& points, double q) {
-  Line best{points.front().x, points.front().y, 0.0};
-  double best_cost = std::numeric_limits<double>::infinity();
-  for (size_t a = 0; a < points.size(); ++a) {
-    for (size_t b = a + 1; b < points.size(); ++b) {
-      const Line line{points[a].x, points[a].y,
-                      (points[b].y - points[a].y) / (points[b].x - points[a].x)};
-      double cost = 0.0;
-      for (const Point& p : points) {
-        const double distance = p.y - line.At(p.x);
-        cost += distance > 0.0 ? q * distance : (q - 1.0) * distance;
-        if (cost >= best_cost) break;
-      }
-      if (cost < best_cost) {
-        best_cost = cost;
-        best = line;
-      }
-    }
-  }
-  return best;
 }
 
 // Minimum of values[i .. i + ahead], for every i.
@@ -99,22 +69,27 @@ size_t SamplesIn(double seconds, double period_s, size_t least) {
 }
 
 // Of a clean stream, also with many missing samples, nearly all intervals are multiples of the
-// median: that one, without what stamps scatter by. 0 for others.
+// median: that one, without what stamps scatter by. 0 for others. Samples that come in packets,
+// stamped in whole microseconds one after the other, are others: microseconds divide everything.
 double PeriodOfMultiples(const std::vector<double>& t) {
   std::vector<double> steps;
   for (size_t i = 1; i < t.size(); ++i) steps.push_back(t[i] - t[i - 1]);
   const double median = Quantile(steps, 0.5);
   if (!(median > 0.0)) return 0.0;
-  size_t multiples = 0;
+  size_t multiples = 0, long_gaps = 0;
   double sum_s = 0.0, sum_periods = 0.0;
   for (const double step : steps) {
     const double periods = std::round(step / median);
     if (periods < 1.0 || std::abs(step - periods * median) > 0.03 * median) continue;
     ++multiples;
+    if (periods > kLongGapPeriods) ++long_gaps;
     sum_s += step;
     sum_periods += periods;
   }
-  return multiples > 0.95 * static_cast<double>(steps.size()) ? sum_s / sum_periods : 0.0;
+  const auto all = static_cast<double>(steps.size());
+  const bool clean = static_cast<double>(multiples) > 0.95 * all &&
+                     static_cast<double>(long_gaps) < kMostLongGaps * all;
+  return clean ? sum_s / sum_periods : 0.0;
 }
 
 // Numbers by intervals that are multiples of the period.
@@ -167,6 +142,11 @@ std::vector<int64_t> NumberSamples(const std::vector<double>& t, double period_s
   }
   const double noise = Quantile(std::move(changes), 0.25);  // 0.32 standard deviations
   const double rise = std::max(kMissingPeriods * period_s, 8.0 * noise);
+  // Near the end, the envelope to come is that of a few samples, which may all be late: what rises
+  // there by no more than samples ever were late is no missing one.
+  const std::vector<double> earlier = BackwardMinimum(late, ahead);
+  double latest = rise;
+  for (size_t i = 0; i < t.size(); ++i) latest = std::max(latest, late[i] - earlier[i]);
 
   int64_t skipped = 0;
   std::vector<std::pair<size_t, int64_t>> skips;  // where, how many
@@ -174,7 +154,7 @@ std::vector<int64_t> NumberSamples(const std::vector<double>& t, double period_s
   for (size_t i = 0; i < t.size(); ++i) {
     const double offset = period_s * static_cast<double>(skipped);
     const double change = before.empty() ? 0.0 : to_come[i] - offset - before.front().second;
-    if (std::abs(change) > rise) {
+    if (std::abs(change) > (i + ahead < t.size() ? rise : latest)) {
       int64_t periods = std::llround(change / period_s);
       if (periods < 0) {  // what was taken for missing was a long latency
         while (periods < 0 && !skips.empty()) {
@@ -200,10 +180,10 @@ std::vector<int64_t> NumberSamples(const std::vector<double>& t, double period_s
 }
 
 // The earliest stamps of stretches of samples, in [begin, end).
-std::vector<Point> EarliestOfBlocks(const std::vector<int64_t>& number,
-                                    const std::vector<double>& late, size_t begin, size_t end,
-                                    size_t block) {
-  std::vector<Point> points;
+std::vector<LinePoint> EarliestOfBlocks(const std::vector<int64_t>& number,
+                                        const std::vector<double>& late, size_t begin, size_t end,
+                                        size_t block) {
+  std::vector<LinePoint> points;
   std::vector<std::pair<double, size_t>> sorted;
   for (size_t from = begin; from < end; from += block) {
     const size_t to = from + 2 * block > end ? end : from + block;  // no short one at the end
@@ -223,20 +203,20 @@ void FitClock(const std::vector<int64_t>& number, const std::vector<double>& lat
               size_t begin, size_t end, std::vector<double>* clock,
               std::vector<double>* residuals) {
   const size_t block = SamplesIn(kBlockS, period_s, kFewestInBlock);
-  const std::vector<Point> points = EarliestOfBlocks(number, late, begin, end, block);
+  const std::vector<LinePoint> points = EarliestOfBlocks(number, late, begin, end, block);
   const double first = static_cast<double>(number[begin]);
   const double span = static_cast<double>(number[end - 1]) - first;
   // Windows overlap by half; each line holds at its window's centre and fades out to the next ones.
   const double halves = std::max(2.0, std::floor(2.0 * span * period_s / kWindowS));
   const double half = span / halves;
-  std::vector<Line> lines;
+  std::vector<StraightLine> lines;
   for (int w = 0; w + 2 <= static_cast<int>(halves); ++w) {
-    std::vector<Point> inside;
-    for (const Point& p : points) {
+    std::vector<LinePoint> inside;
+    for (const LinePoint& p : points) {
       if (p.x >= first + w * half && p.x <= first + (w + 2) * half) inside.push_back(p);
     }
     if (inside.size() < 4) inside = points;  // most of this window is missing
-    lines.push_back(inside.size() < 2 ? Line{points[0].x, points[0].y, 0.0}
+    lines.push_back(inside.size() < 2 ? StraightLine{points[0].x, points[0].y, 0.0}
                                       : QuantileLine(inside, kEarlyBlocks));
   }
   const auto at = [&](double x) {
@@ -250,7 +230,7 @@ void FitClock(const std::vector<int64_t>& number, const std::vector<double>& lat
     return (1.0 - fade) * lines[w].At(x) + fade * lines[w + 1].At(x);
   };
   for (size_t i = begin; i < end; ++i) (*clock)[i] = at(static_cast<double>(number[i]));
-  for (const Point& p : points) residuals->push_back(p.y - at(p.x));
+  for (const LinePoint& p : points) residuals->push_back(p.y - at(p.x));
 }
 
 // Clear evidence that stamps are not the clock: see FindStampClock.
@@ -301,8 +281,13 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_cl
   if (n < 2) return found;
   std::vector<double> t(n);
   for (size_t i = 0; i < n; ++i) t[i] = SecondsSince(stamps_ns.front(), stamps_ns[i]);
+  if (n < kFewestStamps) {  // a gap among a few is no part of the period
+    std::vector<double> steps;
+    for (size_t i = 1; i < n; ++i) steps.push_back(t[i] - t[i - 1]);
+    report.period_s = Quantile(std::move(steps), 0.5);
+    return found;
+  }
   report.period_s = t.back() / static_cast<double>(n - 1);
-  if (n < kFewestStamps) return found;
   double period_s = PeriodOfMultiples(t);
   const auto number_samples = period_s > 0.0 ? NumberByIntervals : NumberSamples;
   if (!(period_s > 0.0)) period_s = RoughPeriod(t);
@@ -310,8 +295,8 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_cl
 
   std::vector<int64_t> number = number_samples(t, period_s);
   for (int round = 0; round < 2; ++round) {  // with a better period, better numbers
-    const std::vector<Point> points = EarliestOfBlocks(number, Lateness(t, number, period_s), 0, n,
-                                                       std::max(kFewestInBlock, n / 80));
+    const std::vector<LinePoint> points = EarliestOfBlocks(number, Lateness(t, number, period_s), 0,
+                                                           n, std::max(kFewestInBlock, n / 80));
     if (points.size() < 2) break;
     const double better_s = period_s + QuantileLine(points, kEarlyBlocks).slope;
     if (!(better_s > 0.5 * period_s && better_s < 2.0 * period_s)) break;

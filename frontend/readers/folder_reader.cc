@@ -15,6 +15,7 @@
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sensor_yaml.h"
 #include "frontend/readers/text.h"
+#include "frontend/stamp_clock.h"
 
 namespace camgyro {
 namespace {
@@ -70,9 +71,11 @@ Status AddFramesOfTables(const CameraFiles& files, Recording* recording) {
   return {};
 }
 
-// A note if sensor.yaml declares another rate than the stamps have, by more than a tenth.
-void NoteRate(const fs::path& part, std::optional<double> declared_hz, double interval_s,
-              Recording* recording) {
+// A note if sensor.yaml declares another rate than the stamps have, by more than a tenth. Theirs is
+// that of the clock behind them: of stamps of arrival, half may follow each other at once.
+void NoteRate(const fs::path& part, std::optional<double> declared_hz,
+              const std::vector<int64_t>& stamps_ns, Recording* recording) {
+  const double interval_s = FindStampClock(stamps_ns).report.period_s;
   if (!declared_hz || !(interval_s > 0.0) || std::abs(*declared_hz * interval_s - 1.0) < 0.1)
     return;
   recording->notes.push_back(Concat((part / "sensor.yaml").string(), ": says rate_hz ",
@@ -121,7 +124,7 @@ Status ReadCamera(const fs::path& cam, Recording* recording) {
   if (Status frames = CheckFrames(cam.string(), recording->frames); !frames) return frames;
   const std::string& frames_of = files.data.empty() ? files.video : files.data;
   if (Status mended = table.order.Mend(frames_of, recording); !mended) return mended;
-  NoteRate(cam, yaml->rate_hz, MedianInterval(recording->frames), recording);
+  NoteRate(cam, yaml->rate_hz, StampsOf(recording->frames), recording);
   if (recording->camera.width_px == 0 && (!files.tracks.empty() || !files.matches.empty())) {
     return BadInput(Concat(files.tracks.empty() ? files.matches : files.tracks,
                            ": the size of the pictures is needed to read pixels as rows in time; "
@@ -145,7 +148,7 @@ Status ReadImu(const fs::path& imu, Recording* recording) {
     recording->camera.q_gyro_cam = yaml->q_body_sensor->conjugate() * *recording->camera.q_gyro_cam;
   }
   Status status = ReadImuCsv((imu / "data.csv").string(), recording);
-  if (status) NoteRate(imu, yaml->rate_hz, MedianInterval(recording->gyro), recording);
+  if (status) NoteRate(imu, yaml->rate_hz, StampsOf(recording->gyro), recording);
   return status;
 }
 

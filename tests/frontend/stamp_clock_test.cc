@@ -131,6 +131,25 @@ TEST(StampClock, KnowsACleanClockOfWhichManySamplesAreMissing) {
   EXPECT_EQ(report.missing, static_cast<int>(number) - 6500);
 }
 
+// The last samples of a stream may all be late, and nothing earlier follows: no sample is missing.
+TEST(StampClock, LateSamplesAtTheEndAreNotMissingOnes) {
+  Sensor sensor;
+  sensor.duration_s = 20.0;
+  sensor.drift_ppm = 0.0;
+  sensor.missing_ratio = 0.0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const std::vector<double> times = SamplingTimes(sensor, &random);
+    const StampClock clock = FindStampClock(Arrivals(times, 3e-3, 30e-3, &random));
+    ASSERT_EQ(clock.sampled_ns.size(), times.size());
+    EXPECT_EQ(clock.report.missing, 0);
+    const size_t last = times.size() - 1;
+    EXPECT_NEAR(SecondsSince(clock.sampled_ns[last - 100], clock.sampled_ns[last]),
+                times[last] - times[last - 100], 0.1e-3);
+  }
+}
+
 // A driver empties the sensor's buffer of eight samples now and then: all get the time of the last.
 TEST(StampClock, LaysPacketsOnTheClock) {
   std::mt19937 random(3);
@@ -144,6 +163,31 @@ TEST(StampClock, LaysPacketsOnTheClock) {
   ASSERT_EQ(clock.report.kind, StampKind::kArrival);
   EXPECT_LT(RmsError(clock.sampled_ns, times), 0.5e-3);
   EXPECT_GT(clock.report.latest_s, 0.9 * 7 / sensor.rate_hz);
+}
+
+// Packets of eight, whose samples are stamped a microsecond after each other as they are read out:
+// no clock of 1 MHz that has lost nearly all of its samples.
+TEST(StampClock, KnowsPacketsThatAreStampedInMicroseconds) {
+  std::vector<int64_t> stamps;
+  for (int64_t i = 0; i < 4000; ++i)
+    stamps.push_back(5'000'000 * (8 * (i / 8) + 7) + 1000 * (i % 8));
+  const StampClock clock = FindStampClock(stamps);
+  EXPECT_EQ(clock.report.kind, StampKind::kArrival);
+  EXPECT_NEAR(clock.report.period_s, 5e-3, 1e-8);
+  ASSERT_EQ(clock.sampled_ns.size(), stamps.size());
+  for (size_t i = 1; i < stamps.size(); ++i) {
+    EXPECT_NEAR(SecondsSince(clock.sampled_ns[i - 1], clock.sampled_ns[i]), 5e-3, 1e-6);
+  }
+}
+
+// A pause is no such packet, however long it is.
+TEST(StampClock, LeavesAPauseAlone) {
+  std::vector<int64_t> stamps;
+  for (int64_t i = 0; i < 800; ++i)
+    stamps.push_back(33'333'333LL * i + (i < 400 ? 0 : 1'000'000'000'000));
+  const StampReport report = FindStampClock(stamps).report;
+  EXPECT_EQ(report.kind, StampKind::kMeasured);
+  EXPECT_NEAR(report.period_s, 33.333333e-3, 0.01e-3);
 }
 
 TEST(StampClock, LeavesCleanClocksAlone) {

@@ -173,6 +173,22 @@ TEST(FolderReader, NotesARateThatTheStampsDoNotHave) {
                                     "give 50 Hz")));
 }
 
+// Samples that are delivered eight at a time: the rate is theirs, not that within a packet.
+TEST(FolderReader, NotesNoRateOfPackets) {
+  const RecordingFolder folder;
+  folder.Write(TrackRecording());
+  std::string rows;
+  for (int64_t i = 0; i < 400; ++i) {
+    const int64_t arrived_ns = 1'000'000'000 + 5'000'000 * (8 * (i / 8) + 7) + 1000 * (i % 8);
+    rows += std::to_string(arrived_ns) + ",0.1,0.2,0.3\n";
+  }
+  folder.Write("imu0/data.csv", rows);
+  folder.Write("imu0/sensor.yaml", "rate_hz: 200\n");
+  const Result<Recording> recording = ReadRecording(folder.path());
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_THAT(recording->notes, ::testing::Not(::testing::Contains(HasSubstr("says rate_hz"))));
+}
+
 TEST(FolderReader, ComposesTheMountingOfCameraAndImu) {
   const RecordingFolder folder;
   folder.Write(TrackRecording());
