@@ -14,7 +14,14 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 // One stream of random numbers per purpose: switching one thing on leaves the others as they are.
-enum Stream : uint32_t { kMotionStream, kSceneStream, kGyroStream, kFrameStream, kTrackStream };
+enum Stream : uint32_t {
+  kMotionStream,
+  kSceneStream,
+  kGyroStream,
+  kFrameStream,
+  kTrackStream,
+  kWanderStream
+};
 
 std::mt19937_64 MakeRandom(uint64_t seed, Stream stream) {
   std::seed_seq sequence{static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32),
@@ -198,6 +205,29 @@ class Tracker {
   int64_t next_id_ = 0;
 };
 
+// The error of the frames' stamps that neighbours share.
+class StampWander {
+ public:
+  explicit StampWander(const Scenario& scenario)
+      : wander_s_(scenario.effects.frame_stamp_jitter.wander_s),
+        kept_(std::exp(
+            -1.0 / (scenario.camera.rate_hz * scenario.effects.frame_stamp_jitter.wander_time_s))),
+        random_(MakeRandom(scenario.seed, kWanderStream)),
+        value_(normal_(random_)) {}
+  // Of the next frame [s].
+  double Next() {
+    const double error_s = wander_s_ * value_;
+    value_ = kept_ * value_ + std::sqrt(1.0 - kept_ * kept_) * normal_(random_);
+    return error_s;
+  }
+
+ private:
+  const double wander_s_, kept_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  double value_;
+};
+
 void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated* result) {
   const CameraOptions& options = scenario.camera;
   std::mt19937_64 random = MakeRandom(scenario.seed, kFrameStream);
@@ -205,6 +235,7 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
   std::normal_distribution<double> normal;
   std::exponential_distribution<double> latency;
   const FrameStampJitter& jitter = scenario.effects.frame_stamp_jitter;
+  StampWander wander(scenario);
   const int count = static_cast<int>(std::floor(scenario.duration_s * options.rate_hz)) + 1;
   for (int i = 0; i < count; ++i) {
     const double time_s = scenario.margin_s + i / options.rate_hz;  // first row, clean clock
@@ -213,7 +244,8 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
     const int64_t exposure_ns = std::llround(1e9 * options.exposure_s * (1.0 + swing));
     const double exposure_s = 1e-9 * static_cast<double>(exposure_ns);
     const double late_s = jitter.latency_s > 0.0 ? jitter.latency_s * latency(random) : 0.0;
-    const int64_t jitter_ns = std::llround(1e9 * (jitter.spread_s * normal(random) + late_s));
+    const int64_t jitter_ns =
+        std::llround(1e9 * (jitter.spread_s * normal(random) + late_s + wander.Next()));
     if (unit(random) < options.drop_fraction && i > 0 && i + 1 < count) continue;
 
     Frame frame;

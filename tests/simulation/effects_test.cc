@@ -175,6 +175,28 @@ TEST(ClockEffects, SkewStepWanderAndExposure) {
   EXPECT_LT(step, 0.004 * 2.0 * M_PI / 7.0 * 1.2 / 30.0);  // it wanders, it does not jump
 }
 
+// The part of the stamps' errors that neighbours share has its size, and is correlated for as long
+// as was asked.
+TEST(ClockEffects, StampsWander) {
+  Scenario scenario;
+  scenario.duration_s = 600.0;
+  scenario.camera.rate_hz = 10.0;
+  scenario.effects.frame_stamp_jitter.wander_s = 3e-3;
+  scenario.effects.frame_stamp_jitter.wander_time_s = 1.5;
+  const Simulated s = SimulateSensors(scenario).value();
+  constexpr size_t kApart = 15;  // frames: 1.5 s
+  double squares = 0.0, products = 0.0;
+  const auto error = [&](size_t i) { return s.truth.delay_s - s.frames[i].delay_s; };
+  for (size_t i = 0; i + kApart < s.frames.size(); ++i) {
+    squares += error(i) * error(i);
+    products += error(i) * error(i + kApart);
+  }
+  const auto count = static_cast<double>(s.frames.size() - kApart);
+  // Some 200 independent values: their rms is known to 5 %, a correlation to 0.07.
+  EXPECT_NEAR(std::sqrt(squares / count), 3e-3, 0.6e-3);
+  EXPECT_NEAR(products / squares, std::exp(-1.0), 0.25);
+}
+
 TEST(ClockEffects, ReadoutReversedByColumnsAndCurved) {
   Scenario scenario = NoiselessTracks();
   Reference reference;
