@@ -358,6 +358,9 @@ class CalibrationJob {
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;
     report_.frame_times = refined->frame_times;
+    if (refined->frame_wander.slow_s > 0.0) {
+      report_.notes.push_back(Describe(refined->frame_wander));
+    }
     report_.converged = refined->converged;
     Tell("refinement", 0.6);
     TakeHalves(halves);

@@ -116,6 +116,9 @@ class PairGraph {
   // residual depends on.
   void SetFrameTimeSpread(const Spread& spread);
   double frame_time_spread_s() const { return *frame_time_spread_s_; }
+  // What frames' own times may share, beyond what their spread allows for: it is in the covariance
+  // of the delay from now on [s^2].
+  void SetSharedFrameTime(double variance_s2) { shared_frame_time_s2_ = variance_s2; }
   PairLatents Latents() const;
 
   // The estimate. With covariance: of the present graph, inflated by the clustered (sandwich)
@@ -190,7 +193,7 @@ class PairGraph {
   FactorGraph::FactorKey state_prior_ = 0, effects_prior_ = 0;
   // Null: frames have no times of their own. Shared with their priors.
   std::shared_ptr<double> frame_time_spread_s_;
-  double frame_time_spread_sigma_s_ = 0.0;
+  double frame_time_spread_sigma_s_ = 0.0, shared_frame_time_s2_ = 0.0;
   std::map<int64_t, FactorGraph::FactorKey> frame_time_priors_;  // by frame
   std::map<int64_t, Pair> pairs_;
   PairBearings bearings_;  // of Residuals, which are called often: kept allocated

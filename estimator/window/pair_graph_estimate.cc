@@ -198,6 +198,7 @@ Status PairGraph::EstimateCovariance(double cluster_s, double inflation, Calibra
   }
   const auto count = static_cast<double>(clusters.size());
   Eigen::MatrixXd covariance = inflation * report.covariance;
+  covariance(kStateDelay, kStateDelay) += shared_frame_time_s2_;
   if (clusters.size() >= 8) {
     Eigen::VectorXd variance = Eigen::VectorXd::Zero(size);
     for (const auto& entry : clusters) variance += entry.second.cwiseAbs2();

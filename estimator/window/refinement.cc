@@ -91,15 +91,27 @@ bool UpdateFrameTimes(PairGraph* graph, std::vector<FrameOffset>* offsets) {
   return std::abs(spread.value_s - before_s) < std::max(kNothingS, 0.03 * before_s);
 }
 
-// The frames' own times where each pair says less of them by the factor that widens the covariance:
-// its direction has taken noise for itself there, too.
-std::vector<FrameOffset> WidenedOffsets(const PairGraph& graph, double inflation) {
+// What pairs say of the frames' own times, less by the factor that widens the covariance: their
+// directions have taken noise for themselves there, too.
+std::vector<PairTimes> WidenedTimes(const PairGraph& graph, double inflation) {
   std::vector<PairTimes> times = graph.FrameTimes();
   for (PairTimes& pair : times) {
     pair.score /= inflation;
     pair.information /= inflation;
   }
-  return OffsetsOf(times, graph.frame_time_spread_s());
+  return times;
+}
+
+// How far the frames' own times wander together, for the covariance of the delay.
+FrameWander FindWander(const std::vector<PairTimes>& times, PairGraph* graph) {
+  const double spread_s = graph->frame_time_spread_s();
+  FrameWander white;
+  white.white_s = spread_s;
+  const FrameWander wander = MostLikelyWander(times, spread_s);
+  graph->SetSharedFrameTime(wander.slow_s > 0.0 ? std::max(0.0, VarianceOfShift(times, wander) -
+                                                                    VarianceOfShift(times, white))
+                                                : 0.0);
+  return wander;
 }
 
 // A tenth of a sigma. Robust weights and strong correlations (f and k1) make steps fall short.
@@ -268,13 +280,15 @@ class Refinement {
   Status Judge(const Calibration& before, const std::vector<std::vector<double>>& residuals) {
     const StateVector moved = Difference(result_.calibration, before);
     const CrossFit cross_fit = graph_->CrossFitOfAll();
+    if (graph_->has_frame_times()) {
+      const std::vector<PairTimes> times = WidenedTimes(*graph_, cross_fit.inflation());
+      result_.frame_times = OffsetsOf(times, graph_->frame_time_spread_s());
+      result_.frame_wander = FindWander(times, graph_.get());
+    }
     if (const Status known = graph_->EstimateCovariance(options_.cluster_s, cross_fit.inflation(),
                                                         &result_.calibration);
         !known) {
       return known;
-    }
-    if (graph_->has_frame_times()) {
-      result_.frame_times = WidenedOffsets(*graph_, cross_fit.inflation());
     }
     FitSum sum(graph_options_, facts_.per_match);
     for (const auto& pair : residuals) sum.Add(pair);

@@ -11,6 +11,7 @@
 #include "core/result.h"
 #include "estimator/window/estimation_input.h"
 #include "estimator/window/frame_times.h"
+#include "estimator/window/frame_wander.h"
 #include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
@@ -44,6 +45,7 @@ struct Refined {
   int skipped_pairs = 0;  // gyro gaps, too few matches, outside the gyro's time
   // With frame_stamp_jitter: of every frame that is in a pair, by PairGraph::FrameNumber.
   std::vector<FrameOffset> frame_times;
+  FrameWander frame_wander;  // of these
   std::shared_ptr<const PairLatents> latents;
 };
 
