@@ -7,6 +7,7 @@
 
 #include "core/format.h"
 #include "estimator/odometry/follow_recording.h"
+#include "estimator/odometry/gyro_rate_trajectory.h"
 #include "pipeline/find_loops.h"
 #include "pipeline/frame_times_file.h"
 #include "pipeline/read_calibration.h"
@@ -30,6 +31,9 @@ DEFINE_int32(
 DEFINE_string(loops, "on",
               "on: look for places that pictures show again, and close the way there; off: do not, "
               "as in the experiments of Feng, Li & Dai");
+DEFINE_string(rate, "frame",
+              "frame: poses of frames and keyframes; gyro: a trajectory at every gyro sample as "
+              "well, through what is finally known of the keyframes");
 DEFINE_double(gravity, 0.0,
               "length of gravity where the recording was made [m/s^2]; without: 9.80665");
 DEFINE_string(lever_arm_mm, "0,0,0",
@@ -47,6 +51,9 @@ Result<OdometryOptions> OptionsFromFlags() {
   options.keyframes = FLAGS_keyframes;
   if (FLAGS_loops != "on" && FLAGS_loops != "off") {
     return BadUsage("--loops=" + FLAGS_loops + ": expected on or off");
+  }
+  if (FLAGS_rate != "frame" && FLAGS_rate != "gyro") {
+    return BadUsage("--rate=" + FLAGS_rate + ": expected frame or gyro");
   }
   if (FLAGS_gravity != 0.0) options.gravity_m_s2 = FLAGS_gravity;
   if (!(options.gravity_m_s2 > 9.0 && options.gravity_m_s2 < 10.5)) {
@@ -121,6 +128,24 @@ std::string Summary(const OdometryRun& run, const LoopClosure& loops, double rec
   return text;
 }
 
+// What there is once the odometry has started.
+void AddTrajectories(const Recording& recording, const OdometryRun& run, const LoopClosure& loops,
+                     double gravity_m_s2, FileSet* files) {
+  files->Add("trajectory.tum", TrajectoryTum(run.poses));
+  files->Add("keyframes.tum", TrajectoryTum(run.keyframes));
+  files->Add("trajectory.csv", PosesCsv(run.poses));
+  files->Add("keyframes.csv", PosesCsv(run.keyframes));
+  files->Add("points.ply", PointsPly(run.points));
+  const auto at_gyro_rate = [&](const std::vector<OdometryPose>& keyframes) {
+    return TrajectoryTum(AtGyroRate(recording.gyro, recording.accel, keyframes, gravity_m_s2));
+  };
+  if (FLAGS_rate == "gyro") files->Add("gyro_rate.tum", at_gyro_rate(run.keyframes));
+  if (loops.Believed() == 0) return;
+  files->Add("closed.tum", TrajectoryTum(loops.poses));
+  files->Add("closed.csv", PosesCsv(loops.poses));
+  if (FLAGS_rate == "gyro") files->Add("closed_gyro_rate.tum", at_gyro_rate(loops.keyframes));
+}
+
 Status RunOdometry(const std::vector<std::string>& arguments) {
   const Result<OdometryOptions> options = OptionsFromFlags();
   if (!options) return tl::unexpected(options.error());
@@ -159,15 +184,7 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
   const std::string yaml = OdometryYaml(*run, *loops);
   files.Add("odometry.yaml", yaml);
   if (run->segments > 0) {
-    files.Add("trajectory.tum", TrajectoryTum(run->poses));
-    files.Add("keyframes.tum", TrajectoryTum(run->keyframes));
-    files.Add("trajectory.csv", PosesCsv(run->poses));
-    files.Add("keyframes.csv", PosesCsv(run->keyframes));
-    files.Add("points.ply", PointsPly(run->points));
-    if (loops->Believed() > 0) {
-      files.Add("closed.tum", TrajectoryTum(loops->poses));
-      files.Add("closed.csv", PosesCsv(loops->poses));
-    }
+    AddTrajectories(*recording, *run, *loops, options->gravity_m_s2, &files);
     const Command command = OdometryCommand();
     files.Add("report.html",
               OdometryReportHtml(*run, *loops,
@@ -180,12 +197,15 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
                                 : 1e-9 * static_cast<double>(recording->frames.back().stamp_ns -
                                                              recording->frames.front().stamp_ns);
   if (!FLAGS_quiet) {
-    std::printf("%swritten    %s/odometry.yaml%s%s\n",
+    std::printf("%swritten    %s/odometry.yaml%s%s%s\n",
                 Summary(*run, *loops, recorded_s, seconds).c_str(), files.folder().c_str(),
                 run->segments > 0 ? ", report.html, trajectory.tum, keyframes.tum, trajectory.csv, "
                                     "keyframes.csv, points.ply"
                                   : "",
-                loops->Believed() > 0 ? ", closed.tum, closed.csv" : "");
+                loops->Believed() > 0 ? ", closed.tum, closed.csv" : "",
+                run->segments == 0 || FLAGS_rate != "gyro" ? ""
+                : loops->Believed() > 0                    ? ", gyro_rate.tum, closed_gyro_rate.tum"
+                                                           : ", gyro_rate.tum");
   }
   if (run->segments == 0) {
     return CannotEstimate("odometry did not start: " + run->start_explanation);
@@ -203,9 +223,8 @@ Command OdometryCommand() {
       "where the device went: positions, velocities and biases of a recording with an "
       "accelerometer, by a sliding window that knows the rolling shutter and both clocks; without "
       "--calibration the recording is calibrated first";
-  command.flags = {"calibration", "out",          "effects",
-                   "device",      "keyframes",    "loops",
-                   "gravity",     "lever_arm_mm", "lever_arm_sigma_mm"};
+  command.flags = {"calibration", "out",  "effects", "device",       "keyframes",
+                   "loops",       "rate", "gravity", "lever_arm_mm", "lever_arm_sigma_mm"};
   for (const std::string& flag : InputFlags()) command.flags.push_back(flag);
   command.flags.emplace_back("quiet");
   command.run = RunOdometry;

@@ -66,6 +66,22 @@ void EmitLoops(YAML::Emitter& out, const OdometryRun& run, const LoopClosure& lo
   out << YAML::EndSeq << YAML::EndMap;
 }
 
+// Of anything with a time and a state.
+template <typename Timed>
+std::string Tum(const std::vector<Timed>& rows) {
+  std::string text =
+      "# time [s, gyro clock] x y z [m] qx qy qz qw: gyro frame in the world, z up\n";
+  for (const Timed& row : rows) {
+    const Eigen::Vector3d& p = row.state.p_world_m;
+    const Eigen::Quaterniond& q = row.state.q_world_gyro;
+    text += Format("%lld.%09lld %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n",
+                   static_cast<long long>(row.time_ns / 1000000000),
+                   static_cast<long long>(row.time_ns % 1000000000), p.x(), p.y(), p.z(), q.x(),
+                   q.y(), q.z(), q.w());
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string VerdictOf(const OdometryRun& run) {
@@ -106,19 +122,8 @@ std::string OdometryYaml(const OdometryRun& run, const LoopClosure& loops) {
   return out.c_str();
 }
 
-std::string TrajectoryTum(const std::vector<OdometryPose>& poses) {
-  std::string text =
-      "# time [s, gyro clock] x y z [m] qx qy qz qw: gyro frame in the world, z up\n";
-  for (const OdometryPose& pose : poses) {
-    const Eigen::Vector3d& p = pose.state.p_world_m;
-    const Eigen::Quaterniond& q = pose.state.q_world_gyro;
-    text += Format("%lld.%09lld %.6f %.6f %.6f %.9f %.9f %.9f %.9f\n",
-                   static_cast<long long>(pose.time_ns / 1000000000),
-                   static_cast<long long>(pose.time_ns % 1000000000), p.x(), p.y(), p.z(), q.x(),
-                   q.y(), q.z(), q.w());
-  }
-  return text;
-}
+std::string TrajectoryTum(const std::vector<OdometryPose>& poses) { return Tum(poses); }
+std::string TrajectoryTum(const std::vector<StateAtTime>& states) { return Tum(states); }
 
 std::string PosesCsv(const std::vector<OdometryPose>& poses) {
   constexpr std::array<const char*, 6> kAxes = {"px", "py", "pz", "rx", "ry", "rz"};

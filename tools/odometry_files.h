@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/odometry/follow_recording.h"
+#include "estimator/odometry/gyro_rate_trajectory.h"
 #include "pipeline/find_loops.h"
 
 namespace camgyro {
@@ -19,6 +20,7 @@ std::string OdometryYaml(const OdometryRun& run, const LoopClosure& loops);
 // "time x y z qx qy qz qw" [s of the gyro's clock, m]: the gyro frame in the world, z up. The
 // format of the TUM RGB-D benchmark.
 std::string TrajectoryTum(const std::vector<OdometryPose>& poses);
+std::string TrajectoryTum(const std::vector<StateAtTime>& states);
 
 // Everything of the poses, one row each, with the covariance of position and rotation.
 std::string PosesCsv(const std::vector<OdometryPose>& poses);
