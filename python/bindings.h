@@ -12,6 +12,8 @@ namespace camgyro {
 void BindRecording(pybind11::module_* module);
 // Calibration, CalibrationReport, calibrate, DeviceReport, combine, VinsStart, initialise_vins.
 void BindResults(pybind11::module_* module);
+// OdometryRun, odometry.
+void BindOdometry(pybind11::module_* module);
 
 // Raises camgyro.Error, whose second argument is the exit code of the command line.
 [[noreturn]] void Raise(const Error& error);

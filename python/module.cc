@@ -37,4 +37,5 @@ PYBIND11_MODULE(camgyro, module) {
   module.add_object("Error", camgyro::error_type);
   camgyro::BindRecording(&module);
   camgyro::BindResults(&module);
+  camgyro::BindOdometry(&module);
 }

@@ -84,17 +84,6 @@ std::string Tum(const std::vector<Timed>& rows) {
 
 }  // namespace
 
-std::string VerdictOf(const OdometryRun& run) {
-  if (run.segments == 0) {
-    return "not started (" + VinsVerdictName(run.start_verdict) + "): " + run.start_explanation;
-  }
-  const bool ended_lost = run.events.back().kind == OdometryEvent::Kind::kLost;
-  if (run.segments == 1 && !ended_lost) return "tracked";
-  std::string text = Format("lost %d time%s", run.segments - !ended_lost,
-                            run.segments - !ended_lost == 1 ? "" : "s");
-  return ended_lost ? text + ", and not found again" : text + ", and found again";
-}
-
 std::string OdometryYaml(const OdometryRun& run, const LoopClosure& loops) {
   YAML::Emitter out;
   out.SetDoublePrecision(10);

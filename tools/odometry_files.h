@@ -11,9 +11,6 @@
 
 namespace camgyro {
 
-// One line for people: whether it followed the device, or why not.
-std::string VerdictOf(const OdometryRun& run);
-
 // odometry.yaml: verdict, events, loops, the calibration as refined.
 std::string OdometryYaml(const OdometryRun& run, const LoopClosure& loops);
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "core/format.h"
 #include "core/time.h"
 
 namespace camgyro {
@@ -61,6 +62,17 @@ class Gathering {
 };
 
 }  // namespace
+
+std::string VerdictOf(const OdometryRun& run) {
+  if (run.segments == 0) {
+    return "not started (" + VinsVerdictName(run.start_verdict) + "): " + run.start_explanation;
+  }
+  const bool ended_lost = run.events.back().kind == OdometryEvent::Kind::kLost;
+  if (run.segments == 1 && !ended_lost) return "tracked";
+  std::string text = Format("lost %d time%s", run.segments - !ended_lost,
+                            run.segments - !ended_lost == 1 ? "" : "s");
+  return ended_lost ? text + ", and not found again" : text + ", and found again";
+}
 
 OdometryOptions WithDeclaredNoise(OdometryOptions options, const GyroInfo& gyro) {
   if (gyro.noise_density_rad_s_rtHz) options.noise.gyro_rad_s_rtHz = *gyro.noise_density_rad_s_rtHz;

@@ -25,6 +25,9 @@ struct OdometryRun {
   double path_m = 0.0;  // sum of the ways between keyframes, within segments
 };
 
+// One line for people: whether it followed the device, or why not.
+std::string VerdictOf(const OdometryRun& run);
+
 // Noise as the recording declares it, in the place of what the options say.
 OdometryOptions WithDeclaredNoise(OdometryOptions options, const GyroInfo& gyro);
 

@@ -112,6 +112,40 @@ class CamgyroTest(unittest.TestCase):
     speed = np.linalg.norm(start.v_world_m_s, axis=1).mean()
     self.assertAlmostEqual(speed, 1.4, delta=0.25)  # of the scenario's path
 
+  def test_odometry(self):
+    run = camgyro.odometry(self.recording, self.report.calibration, p_gyro_cam_m=[0.03, 0.05, 0.0],
+                           p_gyro_cam_sigma_m=0.01)
+    self.assertEqual(run.verdict, 'tracked')
+    self.assertEqual([e['event'] for e in run.events], ['started'])
+    self.assertIn('no pictures', run.loops)
+    self.assertIsNone(run.closed)
+    poses, keyframes = run.poses, run.keyframes
+    n = len(poses['time_ns'])
+    self.assertGreater(n, 120)
+    self.assertEqual(poses['frame_stamp_ns'].dtype, np.int64)
+    self.assertEqual(poses['q_world_gyro'].shape, (n, 4))
+    self.assertEqual(poses['covariance'].shape, (n, 15, 15))
+    # A walk of 8 s at 1.2 m/s, as far as keyframes have left the window, and on the level.
+    way = np.linalg.norm(np.diff(keyframes['p_world_m'], axis=0), axis=1).sum()
+    self.assertAlmostEqual(way, run.path_m, places=9)
+    self.assertAlmostEqual(np.linalg.norm(keyframes['v_world_m_s'], axis=1).mean(), 1.4, delta=0.25)
+    sigma = np.sqrt(np.diagonal(poses['covariance'], axis1=1, axis2=2))
+    self.assertTrue((sigma[1:, 3:6] > 0).all())
+    self.assertLess(sigma[-1, 3:6].max(), 0.3)
+    self.assertGreater(len(run.points_m), 50)
+    self.assertLess(np.abs(run.p_gyro_cam_m - [0.03, 0.05, 0.0]).max(), 0.04)
+    # At the gyro's rate the way goes through the keyframes.
+    dense = run.at_gyro_rate(self.recording)
+    self.assertTrue((np.diff(dense['time_ns']) > 0).all())
+    inside = (keyframes['time_ns'] > dense['time_ns'][0]) & (
+        keyframes['time_ns'] < dense['time_ns'][-1])
+    for axis in range(3):
+      there = np.interp(keyframes['time_ns'][inside], dense['time_ns'], dense['p_world_m'][:, axis])
+      np.testing.assert_allclose(there, keyframes['p_world_m'][inside, axis], atol=1e-4)
+    with self.assertRaises(camgyro.Error) as caught:
+      camgyro.odometry(self.recording, self.report.calibration, keyframes=3)
+    self.assertEqual(caught.exception.args[1], 2)
+
   def test_errors_are_exceptions_with_a_code(self):
     with self.assertRaises(camgyro.Error) as caught:
       camgyro.read_recording('/nowhere/at/all')
@@ -123,7 +157,7 @@ class CamgyroTest(unittest.TestCase):
     self.assertEqual(caught.exception.args[1], 2)
 
   def test_everything_is_documented(self):
-    for name in ('read_recording', 'calibrate', 'initialise_vins'):
+    for name in ('read_recording', 'calibrate', 'initialise_vins', 'odometry'):
       self.assertGreater(len(getattr(camgyro, name).__doc__), 80)
     self.assertIn('(samples, 3)', camgyro.Recording.gyro_rad_s.__doc__)
     self.assertIn('(11, 11)', camgyro.Calibration.covariance.__doc__)
