@@ -42,6 +42,7 @@ void EmitCalibration(YAML::Emitter& out, const OdometryRun& run) {
                 Numbers(sigma.segment<3>(kStateRotation)));
   EmitWithSigma(out, "p_gyro_cam_m", Numbers(run.p_gyro_cam_m), Numbers(run.p_gyro_cam_sigma_m));
   Emit(out, "noise_px", run.noise_px);
+  out << YAML::Key << "noise_of" << YAML::Value << (run.tracks_drift ? "steps" : "sightings");
   out << YAML::EndMap;
 }
 

@@ -52,6 +52,7 @@ class Gathering {
     run_.p_gyro_cam_m = odometry->p_gyro_cam_m();
     run_.p_gyro_cam_sigma_m = odometry->p_gyro_cam_sigma_m();
     run_.noise_px = odometry->noise_px();
+    run_.tracks_drift = odometry->tracks_drift();
     run_.path_m = PathLengthM(run_.keyframes);
     return std::move(run_);
   }

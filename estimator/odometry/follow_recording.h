@@ -21,7 +21,8 @@ struct OdometryRun {
   Calibration calibration;  // as refined, with its covariance
   Eigen::Vector3d p_gyro_cam_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_gyro_cam_sigma_m = Eigen::Vector3d::Zero();
-  double noise_px = 0.0;
+  double noise_px = 0.0;  // of a sighting; of tracks that drift, of a step from frame to frame
+  bool tracks_drift = false;
   double path_m = 0.0;  // sum of the ways between keyframes, within segments
 };
 

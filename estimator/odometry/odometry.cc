@@ -75,7 +75,7 @@ Status Odometry::AddFrame(int64_t stamp_ns, std::vector<TrackedPoint> tracks) {
   if (stamp_ns <= last_frame_ns_) return BadInput("odometry: a frame stamp does not increase");
   last_frame_ns_ = stamp_ns;
   const double to_middle_row_s = calibration_.delay_s + 0.5 * calibration_.readout_s;
-  pending_.push_back({stamp_ns, StampAt(stamp_ns, to_middle_row_s), std::move(tracks)});
+  pending_.push_back({stamp_ns, StampAt(stamp_ns, to_middle_row_s), frames_++, std::move(tracks)});
   Advance();
   return {};
 }
@@ -153,8 +153,12 @@ void Odometry::Track(const QueuedFrame& frame) {
 }
 
 Status Odometry::AddKeyframe(const QueuedFrame& frame, double parallax_rad) {
-  const double still_rad = kStillNoises * window_->noise_px() / calibration_.lens[kFocal];
   const WindowKeyframe newest = window_->newest();
+  // Of a track that drifts, after so many frames, the noise is that of its steps together; it is
+  // halved here, since that of two independent sightings is meant.
+  const auto steps = static_cast<double>(frame.number - newest.frame_number);
+  const double noises = tracks_drift_ ? std::sqrt(0.5 * steps) : 1.0;
+  const double still_rad = kStillNoises * noises * window_->noise_px() / calibration_.lens[kFocal];
   WindowKeyframe from = newest;
   bool replace = false;
   if (window_->size() > 2 && parallax_rad < still_rad && newest_parallax_rad_ < still_rad) {
@@ -168,6 +172,7 @@ Status Odometry::AddKeyframe(const QueuedFrame& frame, double parallax_rad) {
   NewKeyframe added;
   added.frame_stamp_ns = frame.stamp_ns;
   added.time_ns = frame.time_ns;
+  added.frame_number = frame.number;
   added.state = Predict(from.state, imu->Between(0.0, span_s), options_.gravity_m_s2);
   added.link = Link(*imu, from.time_ns, from.time_ns, frame.time_ns, from.state);
   added.sightings = SightingsOf(frame, *imu, from.time_ns);

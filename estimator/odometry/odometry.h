@@ -95,12 +95,16 @@ class Odometry {
   const Calibration& calibration() const { return refined_; }
   const Eigen::Vector3d& p_gyro_cam_m() const { return p_gyro_cam_m_; }
   const Eigen::Vector3d& p_gyro_cam_sigma_m() const { return p_gyro_cam_sigma_m_; }
+  // Of a sighting, or, of tracks that drift, of a step from one frame to the next one.
   double noise_px() const { return noise_px_; }
+  // The tracker's errors add up along its tracks, as the residuals of the last start had it.
+  bool tracks_drift() const { return tracks_drift_; }
 
  private:
   struct QueuedFrame {
     int64_t stamp_ns = 0;
     int64_t time_ns = 0;  // gyro clock: exposure of the middle row
+    int64_t number = 0;
     std::vector<TrackedPoint> tracks;
   };
   // Where a segment ended, and how well it was known.
@@ -118,6 +122,13 @@ class Odometry {
   std::optional<Anchor> DeadReckoned(int64_t time_ns) const;
   WindowPrior FirstPrior() const;
   Eigen::Matrix4d PlaceCovariance(const std::optional<Anchor>& reckoned) const;
+  // The window of a start, solved, and the sightings of its newest keyframe.
+  struct Started {
+    std::unique_ptr<OdometryWindow> window;
+    std::vector<LandmarkSighting> sightings;
+  };
+  Result<Started> StartWindow(const VinsStart& start, const Eigen::Quaterniond& q_world_start,
+                              const Eigen::Vector3d& first_position, bool tracks_drift) const;
   Result<std::vector<LandmarkSighting>> FillWindow(const VinsStart& start,
                                                    const Eigen::Quaterniond& q_world_start,
                                                    const Eigen::Vector3d& first_position,
@@ -146,6 +157,7 @@ class Odometry {
   std::vector<GyroSample> gyro_;
   std::vector<AccelSample> accel_;
   int64_t last_gyro_ns_, last_accel_ns_, last_frame_ns_;
+  int64_t frames_ = 0;
   std::deque<QueuedFrame> pending_;   // their inertial data are not complete
   std::deque<QueuedFrame> starting_;  // of the last seconds, while there is no start
   int64_t next_try_ns_;
@@ -169,6 +181,7 @@ class Odometry {
   Calibration refined_;
   Eigen::Vector3d p_gyro_cam_m_, p_gyro_cam_sigma_m_;
   double noise_px_ = 0.0;
+  bool tracks_drift_ = false;
   std::vector<OdometryPose> poses_, keyframes_;
   std::vector<OdometryEvent> events_;
 };

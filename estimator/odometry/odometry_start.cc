@@ -22,6 +22,10 @@ constexpr double kTryEveryS = 0.5;
 constexpr int kFirstIterations = 20;
 // What the gyro's bias at one time may be from its mean over a recording [rad/s].
 constexpr double kBiasAtOneTimeRadS = 1e-3;
+// Residuals of neighbouring sightings that correlate by more than this are of tracks that drift. On
+// simulated walks it is -0.10 to -0.26 where noise is independent, and 0.36 and more where it adds
+// up (docs/lab/odometry.md).
+constexpr double kDriftCorrelation = 0.15;
 constexpr double kUnknownPlaceM = 1e3;
 
 // Turn about the world's z that takes orientation b as near as possible to a [rad].
@@ -120,6 +124,7 @@ Result<std::vector<LandmarkSighting>> Odometry::FillWindow(const VinsStart& star
     NewKeyframe keyframe;
     keyframe.frame_stamp_ns = frame->stamp_ns;
     keyframe.time_ns = frame->time_ns;
+    keyframe.frame_number = frame->number;
     keyframe.state = biases;
     keyframe.state.q_world_gyro = q_world_start * state.q_world_gyro;
     keyframe.state.p_world_m = first_position + q_world_start * state.p_world_m;
@@ -134,6 +139,31 @@ Result<std::vector<LandmarkSighting>> Odometry::FillWindow(const VinsStart& star
     before_ns = frame->time_ns;
   }
   return sightings;
+}
+
+Result<Odometry::Started> Odometry::StartWindow(const VinsStart& start,
+                                                const Quaterniond& q_world_start,
+                                                const Vector3d& first_position,
+                                                bool tracks_drift) const {
+  OdometryWindowOptions options;
+  options.gravity_m_s2 = options_.gravity_m_s2;
+  options.kept_landmarks = tracks_drift ? 0 : options_.kept_landmarks;
+  options.tracks_drift = tracks_drift;
+  options.walk = options_.walk;
+  Started started;
+  started.window = std::make_unique<OdometryWindow>(calibration_, options);
+  started.window->set_noise_px(noise_px_);
+  Result<std::vector<LandmarkSighting>> sightings =
+      FillWindow(start, q_world_start, first_position, started.window.get());
+  if (!sightings) return tl::unexpected(sightings.error());
+  started.sightings = *std::move(sightings);
+  // The second solve is without the outliers of the first.
+  for (int round = 0; round < 2; ++round) {
+    if (Status solved = started.window->Solve(kFirstIterations); !solved) {
+      return tl::unexpected(solved.error());
+    }
+  }
+  return started;
 }
 
 Status Odometry::Begin(const VinsStart& start) {
@@ -151,21 +181,17 @@ Status Odometry::Begin(const VinsStart& start) {
     first_position = reckoned->state.p_world_m;
   }
 
-  OdometryWindowOptions options;
-  options.gravity_m_s2 = options_.gravity_m_s2;
-  options.kept_landmarks = options_.kept_landmarks;
-  options.walk = options_.walk;
-  auto window = std::make_unique<OdometryWindow>(calibration_, options);
   noise_px_ = start.noise_px;
-  window->set_noise_px(noise_px_);
-  const Result<std::vector<LandmarkSighting>> sightings =
-      FillWindow(start, q_world_start, first_position, window.get());
-  if (!sightings) return tl::unexpected(sightings.error());
-  // The second solve is without the outliers of the first.
-  for (int round = 0; round < 2; ++round) {
-    if (Status solved = window->Solve(kFirstIterations); !solved) return solved;
+  Result<Started> started = StartWindow(start, q_world_start, first_position, false);
+  tracks_drift_ = started && started->window->residual_correlation() > kDriftCorrelation;
+  // The start's noise is that of sightings, not of steps: the first fit of these says what theirs
+  // is.
+  for (int round = 0; tracks_drift_ && started && round < 2; ++round) {
+    started = StartWindow(start, q_world_start, first_position, true);
+    if (started) noise_px_ = started->window->last_noise_px();
   }
-  window_ = std::move(window);
+  if (!started) return tl::unexpected(started.error());
+  window_ = std::move(started->window);
   ++segment_;
   segment_begin_m_ = first_position;
   segment_covariance_ = PlaceCovariance(reckoned);
@@ -178,7 +204,7 @@ Status Odometry::Begin(const VinsStart& start) {
     start_explanation_ = sound.error().message;
     return sound;
   }
-  SetNewestDirections(*sightings);
+  SetNewestDirections(started->sightings);
   const WindowKeyframe newest = window_->newest();
   OdometryPose pose;
   pose.frame_stamp_ns = newest.frame_stamp_ns;
@@ -186,7 +212,7 @@ Status Odometry::Begin(const VinsStart& start) {
   pose.segment = segment_;
   pose.state = newest.state;
   pose.covariance = InWorld(newest.state, newest_covariance_);
-  for (const LandmarkSighting& seen : *sightings) {
+  for (const LandmarkSighting& seen : started->sightings) {
     pose.mapped_tracks += window_->IsMapped(seen.track_id);
   }
   poses_.push_back(pose);

@@ -9,9 +9,9 @@
 #include <cmath>
 #include <utility>
 
-#include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "core/time.h"
+#include "estimator/odometry/pixel_noise.h"
 #include "estimator/odometry/window_program.h"
 #include "factors/bias_walk.h"
 
@@ -30,7 +30,7 @@ constexpr double kOutlierSigmas = 4.0;
 constexpr double kLeastNoisePx = 1e-3;
 // Of each solve's estimate of the noise in what later sightings are weighted with.
 constexpr double kNoiseUpdate = 0.2;
-constexpr int kMinResidualsForNoise = 30;
+constexpr size_t kMinResidualsForNoise = 30;
 constexpr double kRecentreM = 5.0;
 // Of yaw [rad] and position [m] of the first keyframe, which are the frame of all others: far below
 // anything that pictures tell.
@@ -91,6 +91,7 @@ void OdometryWindow::AddFirst(NewKeyframe keyframe, const WindowPrior& prior) {
   OdometryNode& first = keyframes_.emplace_back();
   first.frame_stamp_ns = keyframe.frame_stamp_ns;
   first.time_ns = keyframe.time_ns;
+  first.frame_number = keyframe.frame_number;
   first.state = keyframe.state;
   first.state.p_world_m.setZero();
 
@@ -126,6 +127,7 @@ void OdometryWindow::Add(NewKeyframe keyframe) {
   OdometryNode& added = keyframes_.emplace_back();
   added.frame_stamp_ns = keyframe.frame_stamp_ns;
   added.time_ns = keyframe.time_ns;
+  added.frame_number = keyframe.frame_number;
   added.state = keyframe.state;
   added.state.p_world_m -= origin_m_;
   added.inertial = MakePreintegrationWithBias(*keyframe.link);
@@ -217,20 +219,21 @@ Status OdometryWindow::Solve(int max_iterations) {
 }
 
 void OdometryWindow::DropOutliersAndUpdateNoise(const Program& program) {
-  std::vector<double> norms_px;
+  PixelNoise noise;
   int newest = 0, newest_inliers = 0, points = 0;
   for (auto& [track_id, landmark] : landmarks_) {
     if (!landmark.used()) continue;
     points += !landmark.in_prior;
     const auto& ids = program.SightingsOf(track_id);
     std::vector<OdometrySighting> kept;
+    std::vector<Eigen::Vector2d> residuals_px;
     for (size_t i = 0; i < ids.size(); ++i) {
       OdometrySighting& sighting = landmark.sightings[i];
       Eigen::Vector2d residual;
       const bool evaluated = program.problem().EvaluateResidualBlock(
           ids[i], /*apply_loss_function=*/false, nullptr, residual.data(), nullptr);
       const bool inlier = evaluated && residual.norm() < kOutlierSigmas;
-      if (evaluated) norms_px.push_back(residual.norm() * sighting.measurement.sigma_px);
+      if (evaluated) residuals_px.emplace_back(residual * sighting.measurement.sigma_px);
       if (sighting.keyframe == &keyframes_.back()) {
         ++newest;
         newest_inliers += inlier;
@@ -238,18 +241,18 @@ void OdometryWindow::DropOutliersAndUpdateNoise(const Program& program) {
       if (inlier) kept.push_back(std::move(sighting));
     }
     landmark.sightings = std::move(kept);
+    noise.Add(residuals_px, options_.tracks_drift);
   }
   known_sightings_ = newest;
   inlier_ratio_ = newest > 0 ? static_cast<double>(newest_inliers) / newest : 0.0;
-  if (norms_px.size() < kMinResidualsForNoise) return;
-  // A landmark that only the window knows takes 3 of its residuals' degrees of freedom, a keyframe
-  // about 6.
-  const double all = 2.0 * static_cast<double>(norms_px.size());
-  const double taken = 3.0 * points + 6.0 * static_cast<double>(keyframes_.size());
-  // The median length of a unit normal vector in the plane is 1.177.
-  const double found_px =
-      MedianInPlace(&norms_px) / 1.177 / std::sqrt(std::max(0.1, 1.0 - taken / all));
-  noise_px_ = std::max(kLeastNoisePx, (1.0 - kNoiseUpdate) * noise_px_ + kNoiseUpdate * found_px);
+  residual_correlation_ = noise.Correlation();
+  if (noise.size() < kMinResidualsForNoise) return;
+  // A landmark that only the window knows takes 3 of its residuals' degrees of freedom, or one
+  // where only its steps are residuals; a keyframe about 6.
+  last_noise_px_ = noise.SigmaPx((options_.tracks_drift ? 1.0 : 3.0) * points +
+                                 6.0 * static_cast<double>(keyframes_.size()));
+  noise_px_ =
+      std::max(kLeastNoisePx, (1.0 - kNoiseUpdate) * noise_px_ + kNoiseUpdate * last_noise_px_);
 }
 
 // Moves the inner origin to the oldest keyframe once that is far from it.
@@ -282,7 +285,7 @@ void OdometryWindow::Recentre() {
 
 WindowKeyframe OdometryWindow::keyframe(size_t i) const {
   const OdometryNode& k = keyframes_[i];
-  WindowKeyframe result{k.frame_stamp_ns, k.time_ns, k.state};
+  WindowKeyframe result{k.frame_stamp_ns, k.time_ns, k.frame_number, k.state};
   result.state.p_world_m += origin_m_;
   return result;
 }

@@ -26,6 +26,10 @@ namespace camgyro {
 struct OdometryWindowOptions {
   // Landmarks that stay in the prior while their tracks last, at most; 0: all are split.
   int kept_landmarks = 80;
+  // The tracker re-anchors at every frame: errors of a track add up from frame to frame, and only
+  // what each sighting adds to the one before is independent (factors/drift_step.h). Landmarks are
+  // not kept then.
+  bool tracks_drift = false;
   double gravity_m_s2 = 9.80665;
   BiasWalkDensity walk;
 };
@@ -50,6 +54,7 @@ struct LandmarkSighting {
 struct NewKeyframe {
   int64_t frame_stamp_ns = 0;  // camera clock
   int64_t time_ns = 0;         // gyro clock: exposure of the frame's middle row
+  int64_t frame_number = 0;    // counts all frames, keyframes or not
   NavigationState state;       // a first guess
   // From the keyframe before, which the first does not have.
   std::optional<BiasedPreintegrationMeasurement> link;
@@ -57,7 +62,7 @@ struct NewKeyframe {
 };
 
 struct WindowKeyframe {
-  int64_t frame_stamp_ns = 0, time_ns = 0;
+  int64_t frame_stamp_ns = 0, time_ns = 0, frame_number = 0;
   NavigationState state;
 };
 
@@ -100,7 +105,13 @@ class OdometryWindow {
   // and how many there were.
   double inlier_ratio() const { return inlier_ratio_; }
   int known_sightings() const { return known_sightings_; }
+  // Of a sighting, or, of tracks that drift, of a step from one frame to the next one.
   double noise_px() const { return noise_px_; }
+  double last_noise_px() const { return last_noise_px_; }  // as the last Solve alone has it
+  // Of residuals of neighbouring sightings of the same landmark in the last Solve: below 0 where
+  // noise is independent, since the landmark has taken its part; above where errors of tracks add
+  // up. 0 of tracks that are taken to drift, and where there are too few.
+  double residual_correlation() const { return residual_correlation_; }
   void set_noise_px(double noise_px) { noise_px_ = noise_px; }
 
   const Eigen::Vector3d& p_gyro_cam_m() const { return arm_; }
@@ -163,6 +174,8 @@ class OdometryWindow {
   double noise_px_ = 1.0;
   double inlier_ratio_ = 1.0;
   int known_sightings_ = 0;
+  double residual_correlation_ = 0.0;
+  double last_noise_px_ = 1.0;
 };
 
 }  // namespace camgyro

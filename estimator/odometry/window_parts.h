@@ -18,6 +18,7 @@ namespace camgyro {
 // map.
 struct OdometryNode {
   int64_t frame_stamp_ns = 0, time_ns = 0;
+  int64_t frame_number = 0;
   NavigationState state;  // its position is counted from origin_m_
   // From the keyframe before; null at the oldest.
   std::unique_ptr<ceres::CostFunction> inertial, gyro_walk, accel_walk;

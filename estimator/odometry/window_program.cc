@@ -3,6 +3,8 @@
 #include <ceres/loss_function.h>
 #include <ceres/sphere_manifold.h>
 
+#include "factors/drift_step.h"
+
 namespace camgyro {
 namespace {
 
@@ -53,13 +55,34 @@ OdometryWindow::Program::Program(OdometryWindow* window)
   for (auto& [track_id, landmark] : window->landmarks_) {
     if (!landmark.used()) continue;
     std::vector<ceres::ResidualBlockId>& ids = sightings_[track_id];
-    for (const OdometrySighting& s : landmark.sightings) {
-      ids.push_back(problem_.AddResidualBlock(s.factor.get(), loss_.get(), s.keyframe->q(),
-                                              s.keyframe->p(), s.keyframe->v(),
-                                              window->gravity_.data(), window->arm_.data(),
-                                              window->calibration_.data(), landmark.point.data()));
+    const std::vector<OdometrySighting>& all = landmark.sightings;
+    for (size_t i = 0; i < all.size(); ++i) {
+      ids.push_back(window->options_.tracks_drift && i > 0
+                        ? AddDriftStep(all[i - 1], all[i], &landmark)
+                        : AddSighting(all[i], &landmark));
     }
   }
+}
+
+ceres::ResidualBlockId OdometryWindow::Program::AddSighting(const OdometrySighting& sighting,
+                                                            OdometryLandmark* landmark) {
+  OdometryNode* k = sighting.keyframe;
+  return problem_.AddResidualBlock(sighting.factor.get(), loss_.get(), k->q(), k->p(), k->v(),
+                                   window_->gravity_.data(), window_->arm_.data(),
+                                   window_->calibration_.data(), landmark->point.data());
+}
+
+ceres::ResidualBlockId OdometryWindow::Program::AddDriftStep(const OdometrySighting& from,
+                                                             const OdometrySighting& to,
+                                                             OdometryLandmark* landmark) {
+  OdometryNode *a = from.keyframe, *b = to.keyframe;
+  drift_steps_.push_back(MakeDriftStep(
+      {from.factor.get(), from.measurement.sigma_px}, {to.factor.get(), to.measurement.sigma_px},
+      to.measurement.sigma_px, static_cast<double>(b->frame_number - a->frame_number)));
+  return problem_.AddResidualBlock(drift_steps_.back().get(), loss_.get(), a->q(), a->p(), a->v(),
+                                   b->q(), b->p(), b->v(), window_->gravity_.data(),
+                                   window_->arm_.data(), window_->calibration_.data(),
+                                   landmark->point.data());
 }
 
 void OdometryWindow::Program::AddKeyframe(OdometryNode* k, ReducedInformation* information) {

@@ -2,6 +2,7 @@
 #ifndef CAMGYRO_ESTIMATOR_ODOMETRY_WINDOW_PROGRAM_H_
 #define CAMGYRO_ESTIMATOR_ODOMETRY_WINDOW_PROGRAM_H_
 
+#include <ceres/cost_function.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 
@@ -37,10 +38,15 @@ class OdometryWindow::Program {
   void AddShared(ReducedInformation* information);  // calibration, p_gyro_cam
 
  private:
+  ceres::ResidualBlockId AddSighting(const OdometrySighting& sighting, OdometryLandmark* landmark);
+  ceres::ResidualBlockId AddDriftStep(const OdometrySighting& from, const OdometrySighting& to,
+                                      OdometryLandmark* landmark);
+
   OdometryWindow* window_;
   RotationManifold rotation_manifold_;
   std::unique_ptr<ceres::Manifold> point_manifold_;
   std::unique_ptr<ceres::LossFunction> loss_;
+  std::vector<std::unique_ptr<ceres::CostFunction>> drift_steps_;
   ceres::Problem problem_;
   ceres::ResidualBlockId prior_ = nullptr;
   std::vector<std::vector<ceres::ResidualBlockId>> links_;

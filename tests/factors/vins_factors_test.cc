@@ -6,6 +6,7 @@
 
 #include "core/calibration.h"
 #include "core/so3.h"
+#include "factors/drift_step.h"
 #include "factors/preintegration.h"
 #include "factors/row_projection.h"
 #include "tests/factors/difference_check.h"
@@ -231,6 +232,66 @@ TEST(RowProjection, DerivativesAreThoseOfTheResidual) {
                                   {s.node.q.coeffs().data(), s.node.p.data(), s.node.v.data(),
                                    s.up.data(), s.arm.data(), s.calibration.data(), point.data()},
                                   1e-6, {point.data()});
+}
+
+// The point of Sight, seen a second time from elsewhere, by a row of another place in the picture.
+struct TwoSights {
+  Sight a, b;
+  Eigen::Vector4d point;
+
+  // offset_px: where the two sightings are off.
+  TwoSights(const Eigen::Vector2d& offset_a_px, const Eigen::Vector2d& offset_b_px) {
+    point = a.point.normalized();
+    b.node.p += Vector3d(0.3, -0.1, 0.2);
+    b.node.q = b.node.q * Exp(Vector3d(0.05, -0.04, 0.03));
+    b.m.row_fraction = 0.3;
+    b.m.sigma_px = 0.8;
+    const Vector3d ray = b.CameraAt(0.0).inverse() * Vector3d(a.point.head<3>());
+    b.px = GetLens(DistortionModel::kRadTan).Project(ray, b.lens).value();
+    See(a.px + offset_a_px, &a);
+    See(b.px + offset_b_px, &b);
+  }
+  static void See(const Eigen::Vector2d& px, Sight* s) {
+    ASSERT_TRUE(GetLens(DistortionModel::kRadTan).Unproject(px, s->lens, &s->m.ray));
+  }
+  std::vector<double*> Blocks() {
+    return {a.node.q.coeffs().data(), a.node.p.data(), a.node.v.data(), b.node.q.coeffs().data(),
+            b.node.p.data(),          b.node.v.data(), a.up.data(),     a.arm.data(),
+            a.calibration.data(),     point.data()};
+  }
+  // With steps of 0.1 px from frame to frame.
+  Eigen::Vector2d Residual(double frames) {
+    const auto from = MakeRowProjection(a.m), to = MakeRowProjection(b.m);
+    const auto step =
+        MakeDriftStep({from.get(), a.m.sigma_px}, {to.get(), b.m.sigma_px}, 0.1, frames);
+    Eigen::Vector2d r;
+    EXPECT_TRUE(step->Evaluate(Blocks().data(), r.data(), nullptr));
+    return r;
+  }
+};
+
+TEST(DriftStep, IsZeroWhereBothSightingsAreOffByTheSame) {
+  EXPECT_LT(TwoSights({0.0, 0.0}, {0.0, 0.0}).Residual(4.0).norm(), 1e-8);
+  // 0.9 px of drift; the distortion's slope changes by 1e-3 of it.
+  EXPECT_LT(TwoSights({0.9, -0.4}, {0.9, -0.4}).Residual(4.0).norm(), 0.05);
+}
+
+TEST(DriftStep, IsTheStepInSigmasOfItsFrames) {
+  // 0.2 px with 0.1 px per frame: two sigmas in one frame, one in four.
+  const Eigen::Vector2d one = TwoSights({0.5, 0.5}, {0.7, 0.4}).Residual(1.0);
+  EXPECT_LT((one - Eigen::Vector2d(2.0, -1.0)).norm(), 0.03);
+  const Eigen::Vector2d four = TwoSights({0.5, 0.5}, {0.7, 0.4}).Residual(4.0);
+  EXPECT_LT((four - 0.5 * one).norm(), 1e-9);
+}
+
+TEST(DriftStep, DerivativesAreThoseOfTheResidual) {
+  TwoSights s({0.3, -0.2}, {-0.5, 0.4});
+  s.a.calibration << 1.5, -2.0, 1.0, 2e-3, -3e-3, 0.02, -0.03, 0.01, 0.02, -0.01, 0.03;
+  s.a.node.p += Vector3d(0.02, -0.03, 0.01);
+  const auto from = MakeRowProjection(s.a.m), to = MakeRowProjection(s.b.m);
+  const auto step =
+      MakeDriftStep({from.get(), s.a.m.sigma_px}, {to.get(), s.b.m.sigma_px}, 0.1, 3.0);
+  ExpectJacobiansMatchDifferences(*step, s.Blocks(), 1e-6, {s.point.data()});
 }
 
 TEST(RowProjection, PointsBehindTheCameraAreRefused) {

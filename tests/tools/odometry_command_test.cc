@@ -33,6 +33,7 @@ TEST_F(OdometryCommandTest, WritesWhereTheDeviceWent) {
   EXPECT_EQ(yaml["segments"].as<int>(), 1);
   EXPECT_NEAR(yaml["path_m"].as<double>(), 6.0 * 1.2, 1.5);
   EXPECT_NEAR(yaml["refined"]["delay_s"]["value"].as<double>(), 0.015, 1e-4);
+  EXPECT_EQ(yaml["refined"]["noise_of"].as<std::string>(), "sightings");
   EXPECT_EQ(yaml["events"][0]["event"].as<std::string>(), "started");
   EXPECT_THAT(ReadFile(Path("b/trajectory.csv")), StartsWith("#time_ns,frame_stamp_ns,segment"));
   EXPECT_THAT(ReadFile(Path("b/points.ply")), StartsWith("ply\n"));

@@ -68,6 +68,38 @@ TEST(Odometry, CovarianceIsHonest) {
   EXPECT_LT(std::abs(focal), 0.82);
 }
 
+// A tracker that re-anchors at every frame adds up its noise along each track. It is found, and the
+// sigmas know it: taken for independent, e' C^-1 e of the rotation is three times too large.
+TEST(Odometry, TracksThatDriftAreFoundAndSigmasStayHonest) {
+  double rotation = 0.0, velocity = 0.0;
+  constexpr int kWalks = 3;
+  for (int seed = 1; seed <= kWalks; ++seed) {
+    simulation::Scenario scenario = WalkingScenario(10.0);
+    scenario.seed = static_cast<uint64_t>(seed);
+    scenario.tracks.reanchored = true;
+    const Walk walk = WalkOf(scenario);
+    const auto run = walk.Follow();
+    ASSERT_TRUE(run);
+    ASSERT_EQ(run->segments, 1) << run->start_explanation;
+    EXPECT_TRUE(run->tracks_drift);
+    EXPECT_NEAR(run->noise_px, 0.5, 0.08);  // of a step
+    const TruthFrom truth(walk, run->keyframes.front());
+    const auto poses = static_cast<double>(run->poses.size());
+    for (const OdometryPose& pose : run->poses) {
+      const auto squared = [&](const Vector3d& e, int row) {
+        return e.dot(pose.covariance.block<3, 3>(row, row).ldlt().solve(e)) / 3.0 / poses / kWalks;
+      };
+      rotation += squared(truth.RotationError(pose), kNavRotation);
+      velocity += squared(truth.VelocityError(pose), kNavVelocity);
+    }
+  }
+  EXPECT_LT(rotation, 1.5);
+  EXPECT_LT(velocity, 1.5);
+  const auto independent = WalkFor(4.0).Follow();
+  ASSERT_TRUE(independent);
+  EXPECT_FALSE(independent->tracks_drift);
+}
+
 // Round a heap of points, which stay in sight: what is kept of them holds the position.
 TEST(Odometry, KeepsLandmarksThatStayInSight) {
   const auto squared_error = [](int kept_landmarks, double* nees) {
