@@ -143,7 +143,7 @@ void Odometry::Track(const QueuedFrame& frame) {
                          (many_lost || parallax > options_.keyframe_parallax_rad));
   if (keyframe) {
     if (Status added = AddKeyframe(frame, parallax); !added) {
-      return Lose(frame.time_ns, added.error().message);
+      return Lose(frame.time_ns, added.error().message, /*contradicted=*/true);
     }
     pose.state = window_->newest().state;
     pose.covariance = newest_covariance_;
@@ -260,9 +260,10 @@ void Odometry::LeaveAll() {
   }
 }
 
-void Odometry::Lose(int64_t time_ns, const std::string& why) {
+void Odometry::Lose(int64_t time_ns, const std::string& why, bool contradicted) {
   const WindowKeyframe newest = window_->newest();
-  anchor_ = Anchor{newest.time_ns, newest.state, InWorld(newest.state, newest_covariance_)};
+  anchor_ = Anchor{newest.time_ns, newest.state, InWorld(newest.state, newest_covariance_),
+                   !contradicted};
   LeaveAll();
   window_.reset();
   events_.push_back({OdometryEvent::Kind::kLost, time_ns, segment_, why});

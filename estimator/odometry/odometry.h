@@ -112,6 +112,9 @@ class Odometry {
     int64_t time_ns = 0;
     NavigationState state;
     NavigationCovariance covariance;
+    // Nothing has contradicted it. Else what the window believed, or the inertial data, were wrong
+    // before anybody saw it, and the covariance says nothing.
+    bool believed = true;
   };
 
   void Advance();
@@ -137,7 +140,7 @@ class Odometry {
   Status AddKeyframe(const QueuedFrame& frame, double parallax_rad);
   Status AfterSolve();
   void SetNewestDirections(const std::vector<LandmarkSighting>& sightings);
-  void Lose(int64_t time_ns, const std::string& why);
+  void Lose(int64_t time_ns, const std::string& why, bool contradicted = false);
   void Leave(const WindowKeyframe& keyframe, const NavigationCovariance& covariance);
   void LeaveAll();
   NavigationCovariance InWorld(const NavigationState& state,

@@ -194,6 +194,7 @@ Status Odometry::Begin(const VinsStart& start) {
   window_ = std::move(started->window);
   ++segment_;
   segment_begin_m_ = first_position;
+  if (anchor_ && !anchor_->believed) reckoned.reset();
   segment_covariance_ = PlaceCovariance(reckoned);
   const size_t keyframes_before = keyframes_.size();
   if (Status sound = AfterSolve(); !sound) {

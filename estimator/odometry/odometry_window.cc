@@ -26,6 +26,10 @@ using Eigen::VectorXd;
 constexpr double kMinParallaxRad = 0.01;
 // Of a direction from a point that is triangulated with states as they were predicted.
 constexpr double kMaxTriangulationErrorRad = 0.02;
+// A track that is seen so often and from so different directions, far beyond the error above, and
+// still is of no point, contradicts the motion.
+constexpr size_t kLeastLinesToContradict = 3;
+constexpr double kContradictionParallaxRad = 0.05;
 constexpr double kOutlierSigmas = 4.0;
 constexpr double kLeastNoisePx = 1e-3;
 // Of each solve's estimate of the noise in what later sightings are weighted with.
@@ -185,6 +189,7 @@ void OdometryWindow::DropUnbelievable(OdometryLandmark* landmark) const {
 }
 
 void OdometryWindow::TriangulateNew() {
+  untriangulable_ = 0;
   for (auto& [track_id, landmark] : landmarks_) {
     if (landmark.known()) {
       DropUnbelievable(&landmark);
@@ -195,6 +200,10 @@ void OdometryWindow::TriangulateNew() {
     if (const auto point = Triangulate(lines, kMinParallaxRad, kMaxTriangulationErrorRad)) {
       landmark.point << *point, 1.0;
       landmark.point.normalize();
+    } else if (lines.size() >= kLeastLinesToContradict &&
+               landmark.sightings.back().keyframe == &keyframes_.back() &&
+               Parallax(lines) > kContradictionParallaxRad) {
+      ++untriangulable_;
     }
   }
 }
@@ -243,8 +252,9 @@ void OdometryWindow::DropOutliersAndUpdateNoise(const Program& program) {
     landmark.sightings = std::move(kept);
     noise.Add(residuals_px, options_.tracks_drift);
   }
-  known_sightings_ = newest;
-  inlier_ratio_ = newest > 0 ? static_cast<double>(newest_inliers) / newest : 0.0;
+  known_sightings_ = newest + untriangulable_;
+  inlier_ratio_ =
+      known_sightings_ > 0 ? static_cast<double>(newest_inliers) / known_sightings_ : 0.0;
   residual_correlation_ = noise.Correlation();
   if (noise.size() < kMinResidualsForNoise) return;
   // A landmark that only the window knows takes 3 of its residuals' degrees of freedom, or one
