@@ -45,6 +45,14 @@ std::vector<bool> InliersByEpipolarLine(const FramePair& pair, const GyroRotatio
 
 }  // namespace
 
+int64_t FreeTrackId(const std::vector<std::vector<TrackedPoint>>& tracks) {
+  int64_t free = 0;
+  for (const std::vector<TrackedPoint>& points : tracks) {
+    if (!points.empty()) free = std::max(free, points.back().track_id + 1);
+  }
+  return free;
+}
+
 std::vector<TrackedPoint> TrackCleaner::Add(const std::vector<TrackedPoint>& points,
                                             const std::optional<GyroRotation>& rotation) {
   FramePair pair;

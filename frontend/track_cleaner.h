@@ -13,6 +13,9 @@
 
 namespace camgyro {
 
+// An id above all of these tracks' (one entry per frame, by ascending id).
+int64_t FreeTrackId(const std::vector<std::vector<TrackedPoint>>& tracks);
+
 // From a wrong match on, a track goes on under a new id: what lies before and after it are two
 // features, as far as anybody knows.
 class TrackCleaner {

@@ -119,11 +119,8 @@ Status FollowCorners(const TrackerOptions& options, const Calibration* calibrati
 
 // Returns the share of wrong matches.
 double CutTracksAtOutliers(const Calibration* calibration, Recording* recording) {
-  int64_t next_id = 0;
-  for (const auto& points : recording->tracks) {
-    if (!points.empty()) next_id = std::max(next_id, points.back().track_id + 1);
-  }
-  TrackCleaner cleaner(recording->camera.width_px, recording->camera.height_px, next_id);
+  TrackCleaner cleaner(recording->camera.width_px, recording->camera.height_px,
+                       FreeTrackId(recording->tracks));
   for (size_t i = 0; i < recording->tracks.size(); ++i) {
     std::optional<GyroRotation> rotation;
     if (i > 0) rotation = RotationBetween(*recording, calibration, i - 1);

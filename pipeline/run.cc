@@ -7,12 +7,14 @@
 #include "estimator/diagnosis/model_check.h"
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "frontend/camera_rotations.h"
+#include "frontend/track_jumps.h"
 
 namespace camgyro {
 
 Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* recording) {
   if (recording->HasOnlyAttitudes()) return TrackingSummary{};
   Result<TrackingSummary> summary = TrackingSummary{};
+  const bool tracked_elsewhere = !recording->tracks.empty();
   if (recording->tracks.empty() && recording->matches.empty()) {
     TrackingProgress tracking;
     if (progress) tracking = [&](double done) { progress("tracking", done); };
@@ -22,6 +24,7 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
     return tl::unexpected(enough.error());
   }
   DropRepeatedPictures(recording);
+  if (tracked_elsewhere) summary->outlier_ratio = RemoveTrackJumps(recording).wrong_ratio();
   return summary;
 }
 

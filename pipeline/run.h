@@ -17,9 +17,10 @@
 namespace camgyro {
 
 // Tracks the pictures if the recording has neither tracks nor matches; attitudes are taken where
-// there is nothing else. Frames that repeat a picture are left out. `progress` gets the stage
+// there is nothing else. Frames that repeat a picture are left out, and wrong points of tracks that
+// somebody else has made (RemoveTrackJumps). `progress` gets the stage
 // "tracking"; it may be null. Errors: of the files; kCannotEstimate with too few features or no
-// motion. The summary is empty where nothing had to be tracked.
+// motion. Where nothing had to be tracked, its time is zero.
 Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* recording);
 
 // Rotations between frames at a trial focal length, from at most `max_pairs` pairs of frames. The

@@ -122,7 +122,9 @@ std::string MotionLine(const Recording& recording, const TrackingSummary& tracki
   if (motion.pairs == 0) return "";
   std::string line = Format("matches    %.0f per pair of frames, moving by %.1f px (medians)",
                             motion.matches, motion.motion_px);
-  if (tracking.seconds > 0.0) line += Format(", %.1f %% outliers", 100.0 * tracking.outlier_ratio);
+  if (tracking.seconds > 0.0 || tracking.outlier_ratio > 0.0) {
+    line += Format(", %.1f %% outliers", 100.0 * tracking.outlier_ratio);
+  }
   return line + "\n";
 }
 

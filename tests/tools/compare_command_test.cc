@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/reference/implicit_ekf.h"
+#include "simulation/simulate.h"
 #include "tests/measured_data.h"
 #include "tests/tools/run_camgyro.h"
 #include "tools/comparison/comparison_input.h"
@@ -210,7 +211,9 @@ TEST(MakeInput, ExactMatchesAreThoseWithoutNoise) {
                                 "")
                         .value();
   const Input input = MakeInput(from, 0, StartKind::kDrawn).value();
-  const auto noisy = PairsFromTracks(input.recording.tracks, 1);
+  // As recorded: of the input's tracks, wrong points are taken out.
+  const auto recorded = simulation::SimulateTracks(*from.scenario, from.scenario->seed).value();
+  const auto noisy = PairsFromTracks(recorded.recording.tracks, 1);
   ASSERT_EQ(noisy.size(), input.exact_matches.size());
   size_t exact = 0, all = 0;
   for (size_t k = 0; k < noisy.size(); ++k) {

@@ -10,6 +10,7 @@
 #include "estimator/calibrate.h"
 #include "estimator/reference/implicit_ekf.h"
 #include "frontend/readers/read_recording.h"
+#include "frontend/track_jumps.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/run.h"
 #include "simulation/simulate.h"
@@ -161,6 +162,7 @@ Result<Input> MakeInput(const Case& from, uint64_t run, StartKind start) {
   Input input;
   const Status status = from.scenario ? SimulateInput(from, run, &input) : ReadInput(from, &input);
   if (!status) return tl::unexpected(status.error());
+  RemoveTrackJumps(&input.recording);
   CameraGuess& camera = input.recording.camera;
   camera.aspect_ratio = input.truth.lens[kAspect];
   camera.SetDistortion(input.truth.distortion_model, input.truth.lens);
