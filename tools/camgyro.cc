@@ -1,6 +1,8 @@
 // camgyro COMMAND: finds the command, and turns its result into a message and an exit code.
 #include <glog/logging.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -31,6 +33,19 @@ Status Run(const std::vector<std::string>& words) {
   return command->run(parsed->arguments);
 }
 
+// Says what is left of a run that is interrupted, and ends as if nobody had listened. Only
+// functions that may be called in the middle of any other.
+extern "C" void SayWhatIsKept(int signal) {
+  constexpr char kSaid[] =
+      "\ncamgyro: interrupted. What is not written yet is lost, what is written is whole. camgyro "
+      "track keeps the tracks of pictures, so that other commands begin with them, and camgyro "
+      "batch goes on where it was.\n";
+  const ssize_t written = write(STDERR_FILENO, kSaid, sizeof(kSaid) - 1);
+  static_cast<void>(written);
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
 }  // namespace
 }  // namespace camgyro
 
@@ -38,6 +53,7 @@ int main(int argc, char** argv) {
   google::InitGoogleLogging(argv[0]);
   FLAGS_logtostderr = true;
   FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres warns about ends up in the results
+  std::signal(SIGINT, camgyro::SayWhatIsKept);
   const camgyro::Status status = camgyro::Run({argv + 1, argv + argc});
   if (status) return EXIT_SUCCESS;
   std::fprintf(

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <regex>
 #include <set>
 
@@ -130,6 +131,25 @@ TEST_F(FaultsTest, HalfOfTheSceneMovesByItself) {
   ExpectRecovery("half of the points move by themselves");
 }
 
+// A rigid object, a truck that passes, say: it takes all tracks that begin in the right half of the
+// picture with it, up to 60 px/s to one side and then back, besides what they do by the camera.
+TEST_F(FaultsTest, AMovingObjectFillsHalfOfThePicture) {
+  Simulate(kScenario, "a");
+  std::map<std::string, bool> on_object;  // by track
+  int moved = 0, rows = 0;
+  Edit("cam0/tracks.csv", [&](double time_s, int, Row& row) {
+    ++rows;
+    const double u = std::stod(row[2]);
+    if (!on_object.emplace(row[1], u > 160.0).first->second) return true;
+    ++moved;
+    const double shifted = u + 60.0 * std::sin(time_s) - 60.0 * std::sin(0.5 * time_s);
+    row[2] = std::to_string(shifted);
+    return shifted > 0.0 && shifted < 319.0;
+  });
+  EXPECT_GT(moved, 0.4 * rows);
+  ExpectRecovery("a moving object fills half of the picture");
+}
+
 // A pair of frames has a wrong match where either of its points is wrong: half of them.
 TEST_F(FaultsTest, HalfOfTheMatchesIsWrong) {
   std::string scenario = kScenario;
@@ -173,6 +193,11 @@ TEST_F(FaultsTest, InterruptedOrKilled) {
                                     "/tools/camgyro calibrate a --out=with >log.txt 2>&1")
                                        .c_str());
     EXPECT_TRUE(WIFEXITED(status));
+    const bool interrupted = WEXITSTATUS(status) == 124;  // by timeout, before it had ended
+    if (std::string(how) == "INT 0.2" && interrupted) {
+      EXPECT_THAT(ReadFile(Path("log.txt")),
+                  AllOf(HasSubstr("interrupted"), HasSubstr("camgyro track keeps the tracks")));
+    }
     for (const char* file : {"trace.csv", "delay.csv", "calibration.yaml"}) {
       const std::string name = std::string("with/") + file;
       if (Exists(name)) {
