@@ -77,7 +77,7 @@ double LogDeterminant(const Matrix6d& information) {
 
 double RefinementBytes(const TimedPair& pair, const PairGraphOptions& options) {
   constexpr double kShared = 20.0;  // columns: lens, shutter, mounting, bias, direction, bend
-  constexpr double kTimesHeld = 2.0, kMatchesHeld = 4.0;
+  constexpr double kTimesHeld = 4.0, kMatchesHeld = 4.0;
   // Of the rates, at both ends and for the readout, of which nothing is known here, a few more.
   const double rates = 4.0 + (pair.time_b_s - pair.time_a_s) / options.rate_step_s;
   return static_cast<double>(pair.num_matches) *
