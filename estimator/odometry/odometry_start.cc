@@ -23,7 +23,7 @@ constexpr int kFirstIterations = 20;
 // What the gyro's bias at one time may be from its mean over a recording [rad/s].
 constexpr double kBiasAtOneTimeRadS = 1e-3;
 // Residuals of neighbouring sightings that correlate by more than this are of tracks that drift. On
-// simulated walks it is -0.10 to -0.26 where noise is independent, and 0.36 and more where it adds
+// simulated walks it is -0.10 to -0.26 where noise is independent, and 0.32 and more where it adds
 // up (docs/lab/odometry.md).
 constexpr double kDriftCorrelation = 0.15;
 constexpr double kUnknownPlaceM = 1e3;
