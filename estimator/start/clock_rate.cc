@@ -27,6 +27,9 @@ constexpr double kLeastSigmas = 10.0;
 constexpr double kMostScatter = 0.05;  // of the residuals, over the drift
 constexpr double kLeastOnLine = 0.7;   // of the stretches, within kOnLine of the drift
 constexpr double kOnLine = 0.1;
+// A stretch that turns by less than this share of the liveliest one is at rest: its delay would be
+// that of noise, and stays wherever the line is tried.
+constexpr double kLeastTurning = 0.1;
 
 struct Stretch {
   RateAlignment alignment;
@@ -99,6 +102,20 @@ std::vector<Stretch> Cut(const GyroRates& gyro, const CameraRates& camera, doubl
     first = last;
   }
   return stretches;
+}
+
+// Leaves out the stretches at rest, by what the gyro has about its mean there.
+void LeaveOutRest(double lag_s, std::vector<Stretch>* stretches) {
+  std::vector<double> rms;
+  for (const Stretch& stretch : *stretches) {
+    rms.push_back(stretch.alignment.At(lag_s, {}).gyro_rms_rad_s);
+  }
+  const double most = rms.empty() ? 0.0 : *std::max_element(rms.begin(), rms.end());
+  size_t next = 0;
+  stretches->erase(
+      std::remove_if(stretches->begin(), stretches->end(),
+                     [&](const Stretch&) { return rms[next++] < kLeastTurning * most; }),
+      stretches->end());
 }
 
 struct Line {
@@ -189,6 +206,7 @@ ClockRate FindClockRate(const GyroRates& gyro, const CameraRates& camera, double
                         double last_lag_s) {
   ClockRate rate;
   std::vector<Stretch> stretches = Cut(gyro, camera, first_lag_s, last_lag_s);
+  LeaveOutRest(0.5 * (first_lag_s + last_lag_s), &stretches);
   if (static_cast<int>(stretches.size()) < kLeastStretches) return rate;
   Line line = SearchLine(first_lag_s, last_lag_s, &stretches);
   std::vector<double> times_s, lags_s;

@@ -23,8 +23,9 @@ constexpr double kLargestSkew = 0.022;
 
 // The camera is cut into stretches within which even the largest skew moves the delay by less than
 // the motion takes to change. Where all stretches together fit best, over delays and skews, is
-// refined by the delay that each has of its own, and a robust line through these. Lags are searched
-// from first_lag_s to last_lag_s for the first frame.
+// refined by the delay that each has of its own, and a robust line through these. Stretches at rest
+// say nothing, and are left out. Lags are searched from first_lag_s to last_lag_s for the first
+// frame.
 ClockRate FindClockRate(const GyroRates& gyro, const CameraRates& camera, double first_lag_s,
                         double last_lag_s);
 
