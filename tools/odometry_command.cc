@@ -115,14 +115,14 @@ std::string Summary(const OdometryRun& run, const LoopClosure& loops, double rec
     const Eigen::Vector3d sigma =
         last.covariance.block<3, 3>(kNavPosition, kNavPosition).diagonal().cwiseSqrt();
     text += Format(
-        "path       %.2f m in %zu keyframes; the last frame at (%.2f, %.2f, %.2f) m +- %.2f %.2f "
-        "%.2f\n",
+        "path       %.2f m in %zu keyframes; the last frame at (%.2f, %.2f, %.2f) m +- %.2g %.2g "
+        "%.2g\n",
         run.path_m, run.keyframes.size(), last.state.p_world_m.x(), last.state.p_world_m.y(),
         last.state.p_world_m.z(), sigma.x(), sigma.y(), sigma.z());
     text +=
         Format("lens       %.2f px of noise%s; camera at (%.3f, %.3f, %.3f) m in the gyro frame\n",
-               run.noise_px, run.tracks_drift ? ", added at every frame," : "",
-               run.p_gyro_cam_m.x(), run.p_gyro_cam_m.y(), run.p_gyro_cam_m.z());
+               run.noise_px, run.tracks_drift ? ", added at every frame" : "", run.p_gyro_cam_m.x(),
+               run.p_gyro_cam_m.y(), run.p_gyro_cam_m.z());
   }
   if (run.segments > 0) text += "loops      " + LoopsInWords(loops) + "\n";
   text += Format("time       %.1f s for %.1f s of recording\n", seconds, recorded_s);
