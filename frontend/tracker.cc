@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <optional>
+#include <tuple>
 
 #include "core/robust_statistics.h"
 #include "frontend/patch_alignment.h"
@@ -12,8 +15,12 @@
 namespace camgyro {
 namespace {
 
-// Where KLT ends is where AlignPatch begins, which needs it within a pixel.
+// KLT works on pictures of half the size, and ends at steps below this, in their pixels: where it
+// ends is where AlignPatch begins, which needs it within a pixel.
 const cv::TermCriteria kStop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.03);
+constexpr float kHalf = 0.5F;
+// Levels of the first search, from where a point is expected: the half and the quarter.
+constexpr int kLevelsNearby = 1;
 constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KLT has no texture
 // Variance that no texture takes away (interpolation, changes of shape), over that of the typical
 // corner.
@@ -40,10 +47,10 @@ std::optional<cv::Mat> LikePrevious(const cv::Mat& gray, const std::vector<cv::M
                                     const std::vector<cv::Point2f>& from,
                                     const std::vector<cv::Point2f>& to,
                                     const std::vector<bool>& found) {
-  const int level = std::min(2, static_cast<int>(current.size()) / 2 - 1);
+  const int level = std::min(1, static_cast<int>(current.size()) / 2 - 1);
   const auto at = [&](const std::vector<cv::Mat>& pyramid, const cv::Point2f& point) {
     const cv::Mat& image = pyramid[static_cast<size_t>(2 * level)];
-    const cv::Point2f scaled = point * (1.0F / static_cast<float>(1 << level));
+    const cv::Point2f scaled = point * (kHalf / static_cast<float>(1 << level));
     return static_cast<float>(image.at<uchar>(std::min(cvRound(scaled.y), image.rows - 1),
                                               std::min(cvRound(scaled.x), image.cols - 1)));
   };
@@ -63,6 +70,54 @@ std::optional<cv::Mat> LikePrevious(const cv::Mat& gray, const std::vector<cv::M
   return alike;
 }
 
+// Shi and Tomasi's corners in some cells of a picture, where the mask lets them, the strongest
+// first: the largest ones of their 3 x 3 pixels, and at least min_quality times the largest of all.
+// cv::goodFeaturesToTrack finds the same ones, but always works on the whole picture, also where a
+// few cells are short of corners.
+std::vector<cv::Point2f> Corners(const cv::Mat& gray, const cv::Mat& mask,
+                                 const std::vector<cv::Rect>& cells, double min_quality) {
+  constexpr int kBlock = 3;
+  struct Corner {
+    float strength;
+    cv::Point place;
+  };
+  std::vector<Corner> corners;
+  double strongest = 0.0;
+  cv::Mat strength, largest;
+  for (const cv::Rect& cell : cells) {
+    // The strength of a pixel depends on two around it, and it is compared with one.
+    const cv::Rect wide = cv::Rect(cell.x - 3, cell.y - 3, cell.width + 6, cell.height + 6) &
+                          cv::Rect({0, 0}, gray.size());
+    cv::cornerMinEigenVal(gray(wide), strength, kBlock);
+    cv::dilate(strength, largest, cv::Mat());
+    for (int y = cell.y; y < cell.y + cell.height; ++y) {
+      const auto* allowed = mask.ptr(y);
+      const auto* here = strength.ptr<float>(y - wide.y);
+      const auto* around = largest.ptr<float>(y - wide.y);
+      for (int x = cell.x; x < cell.x + cell.width; ++x) {
+        if (allowed[x] == 0) continue;
+        const float value = here[x - wide.x];
+        strongest = std::max(strongest, static_cast<double>(value));
+        if (value > 0.0F && value == around[x - wide.x]) corners.push_back({value, {x, y}});
+      }
+    }
+  }
+  const auto weakest = static_cast<float>(min_quality * strongest);
+  corners.erase(std::remove_if(corners.begin(), corners.end(),
+                               [&](const Corner& corner) { return corner.strength <= weakest; }),
+                corners.end());
+  std::sort(corners.begin(), corners.end(), [](const Corner& a, const Corner& b) {
+    return std::tie(b.strength, b.place.y, b.place.x) < std::tie(a.strength, a.place.y, a.place.x);
+  });
+  std::vector<cv::Point2f> places;
+  for (const Corner& corner : corners) places.emplace_back(corner.place);
+  return places;
+}
+
+int LevelsOf(const std::vector<cv::Mat>& pyramid) {
+  return static_cast<int>(pyramid.size()) / 2 - 1;  // image and derivative each
+}
+
 }  // namespace
 
 int PyramidLevels(int window_px, double motion_px) {
@@ -78,6 +133,7 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
     pyramid_.clear();
     ids_.clear();
     points_.clear();
+    motions_.clear();
     noise_factors_.clear();
     size_ = gray.size();
   }
@@ -86,6 +142,7 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
   std::vector<cv::Mat> pyramid = Pyramid(gray);
   if (!points_.empty()) FollowPoints(gray, pyramid, predictor);
   pyramid_ = std::move(pyramid);
+  gray.copyTo(gray_);  // the caller may use its memory again
   AddCorners(gray);
 
   std::vector<TrackedPoint> tracked(points_.size());
@@ -96,50 +153,92 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
 }
 
 std::vector<cv::Mat> KltTracker::Pyramid(const cv::Mat& gray) const {
+  cv::Mat half;
+  cv::pyrDown(gray, half);
   std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(gray, pyramid, cv::Size(options_.window_px, options_.window_px),
-                              PyramidLevels(options_.window_px, options_.max_motion * gray.cols));
+  cv::buildOpticalFlowPyramid(half, pyramid, cv::Size(options_.window_px, options_.window_px),
+                              PyramidLevels(options_.window_px, options_.max_motion * half.cols));
   return pyramid;
 }
 
-KltTracker::Search KltTracker::SearchPoints(const std::vector<cv::Mat>& pyramid,
-                                            const std::vector<cv::Point2f>& start) const {
+void KltTracker::SearchPoints(const std::vector<cv::Mat>& pyramid, int levels,
+                              const std::vector<size_t>& which,
+                              const std::vector<cv::Point2f>& start, Search* search) const {
+  if (which.empty()) return;
   const cv::Size window(options_.window_px, options_.window_px);
-  const int levels = static_cast<int>(pyramid.size()) / 2 - 1;  // image and derivative each
+  std::vector<cv::Point2f> from, to;
+  for (const size_t i : which) {
+    from.push_back(points_[i] * kHalf);
+    to.push_back(start[i] * kHalf);
+  }
   std::vector<uchar> found_ok, back_ok;
   std::vector<float> error;
-  Search search{start, {}};
-  cv::calcOpticalFlowPyrLK(pyramid_, pyramid, points_, search.points, found_ok, error, window,
-                           levels, kStop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  cv::calcOpticalFlowPyrLK(pyramid_, pyramid, from, to, found_ok, error, window, levels, kStop,
+                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
   // The way back starts from the same expected motion: it does not know where the way there began.
-  std::vector<cv::Point2f> back(start.size());
-  for (size_t i = 0; i < start.size(); ++i) back[i] = search.points[i] - (start[i] - points_[i]);
-  cv::calcOpticalFlowPyrLK(pyramid, pyramid_, search.points, back, back_ok, error, window, levels,
-                           kStop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
-  search.found.resize(start.size());
-  for (size_t i = 0; i < start.size(); ++i) {
-    search.found[i] = found_ok[i] && back_ok[i] &&
-                      Inside(search.points[i], size_, Border(options_)) &&
-                      cv::norm(back[i] - points_[i]) <= options_.max_forward_backward_px;
+  std::vector<cv::Point2f> back;
+  for (size_t k = 0; k < which.size(); ++k) {
+    back.push_back(to[k] - (start[which[k]] - points_[which[k]]) * kHalf);
   }
-  return search;
+  cv::calcOpticalFlowPyrLK(pyramid, pyramid_, to, back, back_ok, error, window, levels, kStop,
+                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  for (size_t k = 0; k < which.size(); ++k) {
+    const cv::Point2f point = to[k] * (1.0F / kHalf);
+    search->points[which[k]] = point;
+    search->found[which[k]] =
+        found_ok[k] && back_ok[k] && Inside(point, size_, Border(options_)) &&
+        cv::norm(back[k] - from[k]) <= kHalf * options_.max_forward_backward_px;
+  }
+}
+
+void KltTracker::SearchLost(const std::vector<cv::Mat>& pyramid,
+                            const std::vector<cv::Point2f>& start,
+                            const std::vector<cv::Point2f>& expected, Search* search) const {
+  const auto lost = [&] {
+    std::vector<size_t> which;
+    for (size_t i = 0; i < points_.size(); ++i) {
+      if (!search->found[i]) which.push_back(i);
+    }
+    return which;
+  };
+  SearchPoints(pyramid, std::min(kLevelsNearby, LevelsOf(pyramid)), lost(), expected, search);
+  SearchPoints(pyramid, LevelsOf(pyramid), lost(), start, search);
+}
+
+std::vector<cv::Point2f> KltTracker::Expected() const {
+  std::vector<cv::Point2f> expected = points_;
+  for (size_t i = 0; i < points_.size(); ++i) {
+    // A point that has not been followed yet moves like the nearest one that has.
+    size_t like = i;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (size_t j = 0; i >= motions_.size() && j < motions_.size(); ++j) {
+      const double distance = cv::norm(points_[i] - points_[j]);
+      if (distance < nearest) {
+        nearest = distance;
+        like = j;
+      }
+    }
+    if (like < motions_.size()) expected[i] += motions_[like];
+  }
+  return expected;
 }
 
 void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& pyramid,
                               const PointPredictor& predictor) {
-  std::vector<cv::Point2f> start = points_;
+  std::vector<cv::Point2f> start = points_, expected = Expected();
   if (predictor) {
-    for (cv::Point2f& point : start) {
-      const Eigen::Vector2d px = predictor(Eigen::Vector2d(point.x, point.y));
-      if (px.allFinite()) {
-        point = cv::Point2f(static_cast<float>(px.x()), static_cast<float>(px.y()));
-      }
+    for (size_t i = 0; i < points_.size(); ++i) {
+      const Eigen::Vector2d px = predictor(Eigen::Vector2d(points_[i].x, points_[i].y));
+      if (!px.allFinite()) continue;
+      start[i] = cv::Point2f(static_cast<float>(px.x()), static_cast<float>(px.y()));
+      expected[i] = start[i];
     }
   }
-  Search search = SearchPoints(pyramid, start);
+  Search search{start, std::vector<bool>(start.size())};
+  SearchLost(pyramid, start, expected, &search);
   if (const auto alike =
           LikePrevious(gray, pyramid_, pyramid, points_, search.points, search.found)) {
-    search = SearchPoints(Pyramid(*alike), start);
+    SearchLost(Pyramid(*alike), start, expected, &search);
   }
   // KLT has found where each patch went; how it turned and grew on the way decides the last
   // hundredths of a pixel.
@@ -148,14 +247,14 @@ void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& p
     for (auto i = static_cast<size_t>(range.start); i < static_cast<size_t>(range.end); ++i) {
       if (!search.found[i]) continue;
       const cv::Point2f &from = points_[i], &to = search.points[i];
-      aligned[i] =
-          AlignPatch(pyramid_[0], {from.x, from.y}, pyramid[0], {to.x, to.y}, options_.aligned_px);
+      aligned[i] = AlignPatch(gray_, {from.x, from.y}, gray, {to.x, to.y}, options_.aligned_px);
     }
   });
 
   // Ids ascend, so of two points that have run into one the older stays.
   const double too_close_px = 0.5 * options_.min_distance_px;
   size_t kept = 0;
+  motions_.clear();
   std::vector<Eigen::Matrix2d> covariances;
   for (size_t i = 0; i < points_.size(); ++i) {
     if (!aligned[i]) continue;
@@ -165,6 +264,7 @@ void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& p
     for (size_t j = 0; j < kept && good; ++j) good = cv::norm(point - points_[j]) >= too_close_px;
     if (!good) continue;
     ids_[kept] = ids_[i];
+    motions_.push_back(point - points_[i]);
     points_[kept] = point;
     covariances.push_back(aligned[i]->covariance);
     ++kept;
@@ -205,32 +305,34 @@ void KltTracker::AddCorners(const cv::Mat& gray) {
   cv::Mat count = cv::Mat::zeros(grid, grid, CV_32S);
   for (const cv::Point2f& point : points_) ++count.at<int>(cell_of(point));
 
-  // The mask keeps new corners away from the border, from points that are followed already, and
-  // out of cells that have their share.
+  // The mask keeps new corners away from the border and from points that are followed already.
   cv::Mat mask = cv::Mat::zeros(size_, CV_8U);
   const int border = Border(options_);
   cv::rectangle(mask, cv::Point(border, border),
                 cv::Point(size_.width - 1 - border, size_.height - 1 - border), 255, cv::FILLED);
-  for (int row = 0; row < grid; ++row) {
-    for (int column = 0; column < grid; ++column) {
-      if (count.at<int>(row, column) < share) continue;
-      cv::rectangle(
-          mask, cv::Point(column * size_.width / grid, row * size_.height / grid),
-          cv::Point((column + 1) * size_.width / grid - 1, (row + 1) * size_.height / grid - 1), 0,
-          cv::FILLED);
-    }
-  }
   for (const cv::Point2f& point : points_) {
     cv::circle(mask, point, static_cast<int>(options_.min_distance_px), 0, cv::FILLED);
   }
 
-  std::vector<cv::Point2f> corners;  // strongest first
-  cv::goodFeaturesToTrack(gray, corners, /*maxCorners=*/0, options_.min_quality,
-                          options_.min_distance_px, mask);
-  for (const cv::Point2f& corner : corners) {
+  std::vector<cv::Rect> cells;  // that have less than their share
+  for (int row = 0; row < grid; ++row) {
+    for (int column = 0; column < grid; ++column) {
+      if (count.at<int>(row, column) >= share) continue;
+      const cv::Point begin(column * size_.width / grid, row * size_.height / grid);
+      const cv::Point end((column + 1) * size_.width / grid, (row + 1) * size_.height / grid);
+      cells.emplace_back(begin, end);
+    }
+  }
+  const auto far_from_new = [&, first = points_.size()](const cv::Point2f& corner) {
+    return std::none_of(points_.begin() + static_cast<ptrdiff_t>(first), points_.end(),
+                        [&](const cv::Point2f& point) {
+                          return cv::norm(point - corner) < options_.min_distance_px;
+                        });
+  };
+  for (const cv::Point2f& corner : Corners(gray, mask, cells, options_.min_quality)) {
     if (static_cast<int>(points_.size()) >= options_.max_points) break;
     int& in_cell = count.at<int>(cell_of(corner));
-    if (in_cell >= share) continue;
+    if (in_cell >= share || !far_from_new(corner)) continue;
     ++in_cell;
     ids_.push_back(next_id_++);
     points_.push_back(corner);
