@@ -88,7 +88,9 @@ void SlidingWindow::ProcessPending() {
 }
 
 void SlidingWindow::Process(const Pending& pair) {
-  if (!settled_ && num_used_ % options_.unsettled_stride != 0) return;
+  const int stride = num_used_ < options_.unsettled_pairs ? options_.unsettled_stride
+                                                          : options_.undetermined_stride;
+  if (!settled_ && num_used_ % stride != 0) return;
   if (!settled_) {
     // The estimate still moves: the directions with it.
     graph_.AllResiduals(/*search=*/true);
@@ -114,7 +116,7 @@ void SlidingWindow::Process(const Pending& pair) {
   if (listener_) listener_(latest_);
 
   const int keep =
-      settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.unsettled_stride;
+      settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.undetermined_stride;
   while (graph_.num_pairs() > keep) {
     if (const Status left = graph_.MarginalizeOldest(options_.skew_walk_rtHz); !left) {
       ++num_failed_solves_;

@@ -25,6 +25,8 @@ struct SlidingWindowOptions {
   // every `unsettled_stride` pairs.
   int unsettled_pairs = 60;
   int unsettled_stride = 5;
+  // Once it holds so many pairs, the motion is one that determines little: then so often.
+  int undetermined_stride = 10;
   // Settled: the standard deviations are below these. Parameters that the motion never determines
   // hold the window open until unsettled_pairs.
   double settled_focal = 0.01;  // of the focal length
