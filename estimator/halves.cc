@@ -11,6 +11,8 @@ namespace {
 // knows half): the directions are still the right ones, and are searched anew only where the half
 // leaves the whole by more.
 constexpr double kSettledRound = 5.0;
+// A chi-square per parameter that is to be near 1 or not needs no better sigmas than these.
+constexpr double kSettledScale = 0.1;
 
 // How the two halves of a recording disagree, in view of their covariances: chi-square per
 // parameter of the difference. 1 for a right model; what a constant model leaves out, and moves,
@@ -41,6 +43,7 @@ void HalvesFit::Fit(size_t half) {
   RefinementOptions options = refinement_;
   options.max_rounds = std::min(4, refinement_.max_rounds);
   options.settled_round = kSettledRound;
+  options.settled_scale = kSettledScale;
   options.cluster_s = 0.5 * refinement_.cluster_s;
   options.graph.sigma = whole_.quality.noise_px;
   options.latents = whole_.latents;

@@ -79,8 +79,8 @@ class FitSum {
 };
 
 // The spread of the frames' own times, if they have any, for the next solve. True if it has
-// settled: within 3 %, as the scale of the noise, or so small that no match shows it.
-bool UpdateFrameTimes(PairGraph* graph, std::vector<FrameOffset>* offsets) {
+// settled: within a share, as the scale of the noise, or so small that no match shows it.
+bool UpdateFrameTimes(double settled, PairGraph* graph, std::vector<FrameOffset>* offsets) {
   if (!graph->has_frame_times()) return true;
   constexpr double kNothingS = 1e-5;
   const std::vector<PairTimes> times = graph->FrameTimes();
@@ -88,7 +88,7 @@ bool UpdateFrameTimes(PairGraph* graph, std::vector<FrameOffset>* offsets) {
   const double before_s = graph->frame_time_spread_s();
   *offsets = OffsetsOf(times, spread.value_s);
   graph->SetFrameTimeSpread(spread);
-  return std::abs(spread.value_s - before_s) < std::max(kNothingS, 0.03 * before_s);
+  return std::abs(spread.value_s - before_s) < std::max(kNothingS, settled * before_s);
 }
 
 // What pairs say of the frames' own times, less by the factor that widens the covariance: their
@@ -120,9 +120,6 @@ constexpr double kCostTolerance = 0.005;
 // Before the noise scale has settled, a solve is there for the scale, and the next one goes on. A
 // step that lowers the cost by less than this fraction changes it by half of that.
 constexpr double kRoughly = 1e-4;
-
-// Nobody needs a noise scale that is better known.
-bool SameScale(double before, double after) { return std::abs(after / before - 1.0) < 0.03; }
 
 // Steps of the state are measured in sigmas, all of it together. A step below this is the last one:
 // steps shrink by a factor of 1.5 to 5 each, so what is left is as much or twice as much, and that
@@ -187,7 +184,8 @@ class Refinement {
       const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
-      const bool spread_settled = UpdateFrameTimes(graph_.get(), &result_.frame_times);
+      const bool spread_settled =
+          UpdateFrameTimes(options_.settled_scale, graph_.get(), &result_.frame_times);
       const auto residuals = AllResiduals(/*search=*/false);
       const double next_scale = noise_.Next(residuals, scale_);
       result_.calibration = graph_->Estimate();
@@ -241,6 +239,10 @@ class Refinement {
     scale_settled_ = same && options_.latents != nullptr;
     if (facts_.of_attitudes || same) return;
     SetScale(noise_.Next(AllResiduals(/*search=*/true), scale_));
+  }
+
+  bool SameScale(double before, double after) const {
+    return std::abs(after / before - 1.0) < options_.settled_scale;
   }
 
   void SetScale(double scale) {

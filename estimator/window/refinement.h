@@ -24,6 +24,9 @@ struct RefinementOptions {
   // It has settled when a round, with its new directions, has moved the state by less than this, in
   // sigmas (Mahalanobis distance, and each parameter by itself).
   double settled_round = 0.3;
+  // The scale of the noise, and the spread of the frames' times, have settled when a round has
+  // changed them by less than this share. Of that size is the error of all sigmas.
+  double settled_scale = 0.03;
   double cluster_s = 2.0;  // stretches of the clustered covariance
   // Of a fit that has settled, whose result and noise this one starts from; null: of none.
   std::shared_ptr<const PairLatents> latents;
