@@ -9,9 +9,11 @@
 
 #include "core/format.h"
 #include "core/parallel.h"
+#include "estimator/doubts.h"
 #include "estimator/halves.h"
 #include "estimator/informative_pairs.h"
 #include "estimator/moving_tracks.h"
+#include "estimator/online_pass.h"
 
 namespace camgyro {
 namespace {
@@ -60,66 +62,6 @@ Result<StartResult> StartFromPictures(const Recording& recording,
   return best;
 }
 
-// A parameter is determined if the data shrank its prior and the result is of practical use.
-void MarkDetermined(bool attitudes, const Prior& prior, Calibration* c) {
-  StateScales scales;
-  scales.focal_px = c->lens[kFocal];
-  scales.width_px = c->width_px;
-  const StateVector sigma = c->sigma();
-  for (int i = 0; i < kStateSize; ++i) {
-    const StateParameter& parameter = StateTable()[static_cast<size_t>(i)];
-    c->determined[static_cast<size_t>(i)] = !(attitudes && parameter.needs_pixels) &&
-                                            sigma[i] < parameter.useful_sigma.In(scales) &&
-                                            sigma[i] < 0.5 * prior.sigma[i];
-  }
-  // Rows are timed by the angles between them: without a focal length there are none.
-  if (!c->determined[kStateFocal]) c->determined[kStateReadout] = false;
-}
-
-void AddDoubts(const Recording& recording, CalibrationReport* report) {
-  const Calibration& c = report->calibration;
-  const StateVector sigma = c.sigma();
-  const auto determined = [&](int i) { return c.determined[static_cast<size_t>(i)]; };
-  if (!report->converged) {
-    report->doubts.push_back("the refinement had not settled when it was stopped");
-  }
-  const double centre_off =
-      std::hypot(c.lens[kCx] - 0.5 * c.width_px, c.lens[kCy] - 0.5 * c.height_px);
-  if (determined(kStateCx) && determined(kStateCy) &&
-      centre_off > 0.05 * std::hypot(c.width_px, c.height_px)) {
-    report->doubts.push_back(Format(
-        "the principal point is %.0f px off the centre of the picture: real lenses stay within "
-        "3 %% of the diagonal, so another effect may hide there",
-        centre_off));
-  }
-  if (determined(kStateReadout) && c.readout_s < -3.0 * sigma[kStateReadout]) {
-    report->notes.push_back("the readout is negative: rows are read from bottom to top");
-  }
-  const double interval = MedianInterval(recording.frames);
-  if (determined(kStateReadout) && std::abs(c.readout_s) > 1.05 * interval) {
-    report->doubts.push_back(
-        Format("the readout time of %.1f ms is longer than the frame interval of %.1f ms",
-               1e3 * c.readout_s, 1e3 * interval));
-  }
-  if (report->unseen && report->unseen->rms_px > 1.3 * report->quality.rms_px) {
-    report->doubts.push_back(
-        Format("frames that the fit has not seen fit worse: %.3f px against %.3f px",
-               report->unseen->rms_px, report->quality.rms_px));
-  }
-  if (report->online) {
-    StateVector gap = Difference(*report->online, c).cwiseAbs();
-    const StateVector scale = (report->online->sigma().cwiseAbs2() + sigma.cwiseAbs2()).cwiseSqrt();
-    for (const int i : {kStateFocal, kStateReadout, kStateDelay}) {
-      if (determined(i) && gap[i] > 6.0 * scale[i]) {
-        report->doubts.push_back(StateNames()[static_cast<size_t>(i)] +
-                                 Format(": online pass and refinement differ by %.1f of their "
-                                        "sigmas",
-                                        gap[i] / scale[i]));
-      }
-    }
-  }
-}
-
 }  // namespace
 
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
@@ -155,10 +97,13 @@ class CalibrationJob {
     if (!attitudes_ && options_.online) {
       if (const Status done = Window(); !done) return tl::unexpected(done.error());
     }
+    if (!options_.refine) {
+      if (const Status done = FinishWindow(); !done) return tl::unexpected(done.error());
+    }
     if (options_.refine || !report_.online) {
       if (const Status done = Refinement(); !done) return tl::unexpected(done.error());
     } else {
-      report_.calibration = estimate_;
+      report_.calibration = *report_.online;
       report_.quality.pairs = report_.pairs_used_online;
       report_.quality.noise_px = report_.trace.back().noise_px;
       report_.converged = true;
@@ -227,55 +172,34 @@ class CalibrationJob {
     return {};
   }
 
-  // The online pass, in the order of real time: a sample is known when its time has come, a frame
-  // at its stamp.
+  // The online pass, so far that the refinement can start from it, or to its end.
   Status Window() {
     SlidingWindowOptions window_options = options_.window;
     window_options.graph = graph_options_;
-    SlidingWindow window(estimate_, report_.prior, input_.origin_ns, window_options);
-    window.SetListener([&](const WindowUpdate& update) { report_.trace.push_back(update); });
-    size_t next_sample = 0;
-    const std::vector<TimedPair> pairs = SideBySide(input_.pairs);
-    for (size_t i = 0; i < pairs.size(); ++i) {
-      const TimedPair& pair = pairs[i];
-      const double known_s = pair.time_b_s + DelayOf(estimate_, pair.second());
-      if (const Status fed = FeedGyro(known_s, &next_sample, &window); !fed) return fed;
-      if (window.AddPair(recording_.frames[static_cast<size_t>(pair.frame_a)].stamp_ns,
-                         recording_.frames[static_cast<size_t>(pair.frame_b)].stamp_ns,
-                         MatchesOf(recording_, pair), pair.exposure_a_s,
-                         pair.exposure_b_s) != AddResult::kAccepted) {
-        return BadInput("frames " + std::to_string(pair.frame_a) + " and " +
-                        std::to_string(pair.frame_b) +
-                        ": the stamp repeats or goes back, or a pixel is not finite");
-      }
-      if (i % 20 == 0) Tell("window", static_cast<double>(i) / static_cast<double>(pairs.size()));
+    online_.emplace(recording_, input_, estimate_, report_.prior, window_options);
+    if (const Status done = online_->RunUntilSettled(progress_); !done) return done;
+    if (online_->has_estimate()) {
+      estimate_ = online_->window().latest().estimate;
+      online_noise_ = online_->window().latest().noise_px;
     }
-    if (const Status fed = FeedGyro(std::numeric_limits<double>::infinity(), &next_sample, &window);
-        !fed) {
-      return fed;
-    }
+    clock_.Finish("window");
+    return {};
+  }
+
+  // All of the online pass.
+  Status FinishWindow() {
+    if (!online_) return {};
+    if (const Status done = online_->Finish(); !done) return done;
+    const SlidingWindow& window = online_->window();
+    report_.trace = online_->TakeTrace();
     report_.pairs_used_online = window.num_used_pairs();
     report_.skipped_pairs = window.num_skipped_pairs();
     if (!window.failure().empty()) {
       report_.notes.push_back("the online pass ended without a result: " + window.failure());
     }
     if (!report_.trace.empty()) {
-      estimate_ = window.latest().estimate;
-      report_.online = estimate_;
+      report_.online = window.latest().estimate;
       MarkDetermined(attitudes_, report_.prior, &*report_.online);
-    }
-    clock_.Finish("window");
-    return {};
-  }
-
-  // The samples up to a time.
-  Status FeedGyro(double until_s, size_t* next, SlidingWindow* window) const {
-    for (; *next < input_.rates.size() && input_.rates[*next].time_s <= until_s; ++*next) {
-      if (window->AddGyroSample(recording_.gyro[*next], input_.rates[*next].saturated) !=
-          AddResult::kAccepted) {
-        return BadInput("gyro sample " + std::to_string(*next) +
-                        ": the stamp repeats or goes back, or a rate is not finite");
-      }
     }
     return {};
   }
@@ -283,7 +207,7 @@ class CalibrationJob {
   RefinementOptions OptionsOfRefinement() const {
     RefinementOptions refinement = options_.refinement;
     refinement.graph = graph_options_;
-    if (!report_.trace.empty()) refinement.graph.sigma = report_.trace.back().noise_px;
+    if (online_noise_) refinement.graph.sigma = online_noise_;
     const double duration = input_.pairs.back().time_b_s - input_.pairs.front().time_a_s;
     refinement.cluster_s = std::clamp(duration / 12.0, 0.2, refinement.cluster_s);
     return refinement;
@@ -327,6 +251,8 @@ class CalibrationJob {
                  refined_pairs_.size(), input_.pairs.size()));
     }
     RefinementOptions refinement = OptionsOfRefinement();
+    Status online;
+    Beside rest_of_window([&] { online = FinishWindow(); });
     Calibration from = estimate_;
     if (from.effects != nullptr &&
         std::any_of(from.effects->items().begin(), from.effects->items().end(),
@@ -338,6 +264,8 @@ class CalibrationJob {
              }).calibration;
     }
     Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
+    rest_of_window.Wait();
+    if (!online) return online;
     if (!refined && report_.online) {  // a window that has run away, to a lens without rays
       refined = RefineWith(refinement, from_start_, std::nullopt);
       report_.notes.push_back(
@@ -412,6 +340,8 @@ class CalibrationJob {
   CalibrationReport report_;
   StageClock clock_;
   Calibration estimate_, from_start_;
+  std::optional<OnlinePass> online_;
+  std::optional<double> online_noise_;  // [px], where the refinement starts
   std::vector<TimedPair> refined_pairs_;
   PairGraphOptions graph_options_;
 };

@@ -1,0 +1,69 @@
+#include "estimator/doubts.h"
+
+#include <cmath>
+
+#include "core/format.h"
+#include "core/state.h"
+
+namespace camgyro {
+
+void MarkDetermined(bool attitudes, const Prior& prior, Calibration* c) {
+  StateScales scales;
+  scales.focal_px = c->lens[kFocal];
+  scales.width_px = c->width_px;
+  const StateVector sigma = c->sigma();
+  for (int i = 0; i < kStateSize; ++i) {
+    const StateParameter& parameter = StateTable()[static_cast<size_t>(i)];
+    c->determined[static_cast<size_t>(i)] = !(attitudes && parameter.needs_pixels) &&
+                                            sigma[i] < parameter.useful_sigma.In(scales) &&
+                                            sigma[i] < 0.5 * prior.sigma[i];
+  }
+  // Rows are timed by the angles between them: without a focal length there are none.
+  if (!c->determined[kStateFocal]) c->determined[kStateReadout] = false;
+}
+
+void AddDoubts(const Recording& recording, CalibrationReport* report) {
+  const Calibration& c = report->calibration;
+  const StateVector sigma = c.sigma();
+  const auto determined = [&](int i) { return c.determined[static_cast<size_t>(i)]; };
+  if (!report->converged) {
+    report->doubts.push_back("the refinement had not settled when it was stopped");
+  }
+  const double centre_off =
+      std::hypot(c.lens[kCx] - 0.5 * c.width_px, c.lens[kCy] - 0.5 * c.height_px);
+  if (determined(kStateCx) && determined(kStateCy) &&
+      centre_off > 0.05 * std::hypot(c.width_px, c.height_px)) {
+    report->doubts.push_back(Format(
+        "the principal point is %.0f px off the centre of the picture: real lenses stay within "
+        "3 %% of the diagonal, so another effect may hide there",
+        centre_off));
+  }
+  if (determined(kStateReadout) && c.readout_s < -3.0 * sigma[kStateReadout]) {
+    report->notes.push_back("the readout is negative: rows are read from bottom to top");
+  }
+  const double interval = MedianInterval(recording.frames);
+  if (determined(kStateReadout) && std::abs(c.readout_s) > 1.05 * interval) {
+    report->doubts.push_back(
+        Format("the readout time of %.1f ms is longer than the frame interval of %.1f ms",
+               1e3 * c.readout_s, 1e3 * interval));
+  }
+  if (report->unseen && report->unseen->rms_px > 1.3 * report->quality.rms_px) {
+    report->doubts.push_back(
+        Format("frames that the fit has not seen fit worse: %.3f px against %.3f px",
+               report->unseen->rms_px, report->quality.rms_px));
+  }
+  if (report->online) {
+    StateVector gap = Difference(*report->online, c).cwiseAbs();
+    const StateVector scale = (report->online->sigma().cwiseAbs2() + sigma.cwiseAbs2()).cwiseSqrt();
+    for (const int i : {kStateFocal, kStateReadout, kStateDelay}) {
+      if (determined(i) && gap[i] > 6.0 * scale[i]) {
+        report->doubts.push_back(StateNames()[static_cast<size_t>(i)] +
+                                 Format(": online pass and refinement differ by %.1f of their "
+                                        "sigmas",
+                                        gap[i] / scale[i]));
+      }
+    }
+  }
+}
+
+}  // namespace camgyro

@@ -1,0 +1,65 @@
+#include "estimator/online_pass.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/estimator/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+struct Passes {
+  simulation::Simulated s;
+  EstimationInput input;
+  Prior start;
+
+  explicit Passes(const simulation::Scenario& scenario)
+      : s(simulation::SimulateTracks(scenario).value()),
+        input(OutlineOf(s.recording, SelectPairs(s.recording))),
+        start(StartOffTheTruth(s.truth)) {}
+  OnlinePass Make() const {
+    return OnlinePass(s.recording, input, start.mean, start, SlidingWindowOptions());
+  }
+};
+
+// Where the pass is left and taken up again changes nothing.
+TEST(OnlinePass, StopsWhenItHasSettledAndGoesOn) {
+  const Passes passes(ShortScenario(30.0));
+  OnlinePass at_once = passes.Make(), in_two = passes.Make();
+  ASSERT_TRUE(at_once.Finish());
+  ASSERT_TRUE(in_two.RunUntilSettled(nullptr));
+  ASSERT_TRUE(in_two.has_estimate());
+  EXPECT_TRUE(in_two.window().latest().settled);
+  EXPECT_GE(in_two.window().num_used_pairs(), OnlinePass::kSettledPairs);
+  EXPECT_LT(in_two.window().num_used_pairs(), at_once.window().num_used_pairs());
+  const StateVector error =
+      ErrorInSigmas(in_two.window().latest().estimate, passes.s.truth).cwiseAbs();
+  EXPECT_LT(error.maxCoeff(), 4.5) << error.transpose();
+
+  ASSERT_TRUE(in_two.Finish());
+  EXPECT_EQ(in_two.window().num_used_pairs(), at_once.window().num_used_pairs());
+  EXPECT_EQ(Difference(in_two.window().latest().estimate, at_once.window().latest().estimate),
+            StateVector::Zero());
+  EXPECT_EQ(in_two.TakeTrace().size(), at_once.TakeTrace().size());
+}
+
+// A motion that determines too little has no such moment.
+TEST(OnlinePass, GoesToTheEndWithoutSettling) {
+  simulation::Scenario scenario = ShortScenario(6.0);
+  scenario.motion.rotation_rms_rad_s.setConstant(0.005);
+  const Passes passes(scenario);
+  OnlinePass pass = passes.Make();
+  int told = 0;
+  ASSERT_TRUE(pass.RunUntilSettled([&](const std::string& stage, double done) {
+    EXPECT_EQ(stage, "window");
+    EXPECT_LT(done, 1.0);
+    ++told;
+  }));
+  EXPECT_GT(told, 3);
+  EXPECT_FALSE(pass.window().latest().settled);
+  OnlinePass all = passes.Make();
+  ASSERT_TRUE(all.Finish());
+  EXPECT_EQ(pass.window().num_used_pairs(), all.window().num_used_pairs());
+}
+
+}  // namespace
+}  // namespace camgyro
