@@ -2,23 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <utility>
 
 #include "core/format.h"
 #include "core/robust_statistics.h"
+#include "core/stamp_rate.h"
 #include "core/time.h"
+#include "frontend/lower_envelope.h"
 #include "frontend/quantile_line.h"
 
 namespace camgyro {
 namespace {
 
 constexpr size_t kFewestStamps = 40;
-constexpr size_t kSlopeLag = 32;      // samples; bridges bunches, mostly without a missing sample
-constexpr double kLookaheadS = 0.25;  // after which late samples have been caught up
-constexpr size_t kFewestAhead = 16;   // samples
+constexpr size_t kSlopeLag = 32;  // samples; bridges bunches, mostly without a missing sample
 constexpr double kLongGapPeriods = 100.0;  // in a stream with missing samples, a rarity
 constexpr double kMostLongGaps = 0.01;     // of the intervals
-constexpr double kMissingPeriods = 0.6;    // rise of the envelope that is a missing sample
 constexpr double kScatterPeriods = 0.01;   // clean measured recordings: 0.003 and less
 constexpr double kScatterS = 50e-6;        // less turns no camera by a visible angle
 constexpr double kLatePeriods = 0.5;
@@ -26,46 +26,15 @@ constexpr double kLateS = 5e-3;
 constexpr int kFewestLate = 3;            // samples
 constexpr double kWanderOfScatter = 4.0;  // a random walk over 20 s wanders by more
 constexpr double kWindowS = 20.0;
-constexpr double kBlockS = 0.25;
+constexpr double kDriftPerS = 5e-6;  // of a phone's oscillator
 constexpr size_t kFewestInBlock = 16;
 constexpr double kBreakS = 0.25;
 constexpr double kEarlyInBlock = 0.05;  // quantile of a block's stamps that stands for it
 constexpr double kEarlyBlocks = 0.2;    // quantile of blocks through which the lines go
 
-double Quantile(std::vector<double> values, double q) {
-  const auto at = values.begin() +
-                  static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 // Half the width of the middle 68 %.
 double Scatter(const std::vector<double>& values) {
   return 0.5 * (Quantile(values, 0.84) - Quantile(values, 0.16));
-}
-
-// Minimum of values[i .. i + ahead], for every i.
-std::vector<double> ForwardMinimum(const std::vector<double>& values, size_t ahead) {
-  std::vector<double> minimum(values.size());
-  std::deque<size_t> candidates;
-  for (size_t i = values.size(); i-- > 0;) {
-    while (!candidates.empty() && values[candidates.back()] >= values[i]) candidates.pop_back();
-    candidates.push_back(i);
-    if (candidates.front() > i + ahead) candidates.pop_front();
-    minimum[i] = values[candidates.front()];
-  }
-  return minimum;
-}
-
-std::vector<double> BackwardMinimum(std::vector<double> values, size_t behind) {
-  std::reverse(values.begin(), values.end());
-  std::vector<double> minimum = ForwardMinimum(values, behind);
-  std::reverse(minimum.begin(), minimum.end());
-  return minimum;
-}
-
-size_t SamplesIn(double seconds, double period_s, size_t least) {
-  return std::max(least, static_cast<size_t>(std::lround(seconds / period_s)));
 }
 
 // Of a clean stream, also with many missing samples, nearly all intervals are multiples of the
@@ -133,15 +102,11 @@ std::vector<double> Lateness(const std::vector<double>& t, const std::vector<int
 std::vector<int64_t> NumberSamples(const std::vector<double>& t, double period_s) {
   std::vector<int64_t> number(t.size());
   for (size_t i = 0; i < t.size(); ++i) number[i] = static_cast<int64_t>(i);
-  const size_t ahead = SamplesIn(kLookaheadS, period_s, kFewestAhead);
   const std::vector<double> late = Lateness(t, number, period_s);
-  const std::vector<double> to_come = ForwardMinimum(late, ahead);
-  std::vector<double> changes{0.0};  // of the envelope; the smaller ones are its noise
-  for (size_t i = ahead / 2; i < t.size(); ++i) {
-    changes.push_back(std::abs(to_come[i] - to_come[i - ahead / 2]));
-  }
-  const double noise = Quantile(std::move(changes), 0.25);  // 0.32 standard deviations
-  const double rise = std::max(kMissingPeriods * period_s, 8.0 * noise);
+  const Envelope envelope = EnvelopeToCome(late, period_s);
+  const size_t ahead = envelope.ahead;
+  const std::vector<double>& to_come = envelope.least;
+  const double rise = envelope.rise;
   // Near the end, the envelope to come is that of a few samples, which may all be late: what rises
   // there by no more than samples ever were late is no missing one.
   const std::vector<double> earlier = BackwardMinimum(late, ahead);
@@ -198,16 +163,24 @@ std::vector<LinePoint> EarliestOfBlocks(const std::vector<int64_t>& number,
   return points;
 }
 
-// The clock of one stretch without breaks, as a correction to period * number.
+// How long the clock's lines are to be where stretches are off them by residual_s: as long as makes
+// them known as badly at their ends, for lack of stamps (StampRateSigma), as the clock's drift
+// bends away from them there, by a twelfth of drift * length^2.
+double WindowFor(double residual_s) {
+  const double of_a_second_s = 0.5 * StampRateSigma(residual_s, 1.0);  // falls with the root
+  return std::max(kWindowS, std::pow(12.0 * of_a_second_s / kDriftPerS, 0.4));
+}
+
+// The clock of one stretch without breaks, as a correction to period * number: lines over window_s.
 void FitClock(const std::vector<int64_t>& number, const std::vector<double>& late, double period_s,
-              size_t begin, size_t end, std::vector<double>* clock,
+              double window_s, size_t begin, size_t end, std::vector<double>* clock,
               std::vector<double>* residuals) {
-  const size_t block = SamplesIn(kBlockS, period_s, kFewestInBlock);
+  const size_t block = SamplesIn(kStampStretchS, period_s, kFewestInBlock);
   const std::vector<LinePoint> points = EarliestOfBlocks(number, late, begin, end, block);
   const double first = static_cast<double>(number[begin]);
   const double span = static_cast<double>(number[end - 1]) - first;
   // Windows overlap by half; each line holds at its window's centre and fades out to the next ones.
-  const double halves = std::max(2.0, std::floor(2.0 * span * period_s / kWindowS));
+  const double halves = std::max(2.0, std::floor(2.0 * span * period_s / window_s));
   const double half = span / halves;
   std::vector<StraightLine> lines;
   for (int w = 0; w + 2 <= static_cast<int>(halves); ++w) {
@@ -315,12 +288,17 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_cl
   if (!is_late && !even_if_clean) return found;
 
   std::vector<double> clock(n, 0.0), residuals;
-  size_t begin = 0;
-  for (size_t i = 1; i <= n; ++i) {
-    if (i < n && static_cast<double>(number[i] - number[i - 1]) * period_s < kBreakS) continue;
-    FitClock(number, late, period_s, begin, i, &clock, &residuals);
-    begin = i;
-  }
+  const auto fit = [&](double window_s) {
+    size_t begin = 0;
+    residuals.clear();
+    for (size_t i = 1; i <= n; ++i) {
+      if (i < n && static_cast<double>(number[i] - number[i - 1]) * period_s < kBreakS) continue;
+      FitClock(number, late, period_s, window_s, begin, i, &clock, &residuals);
+      begin = i;
+    }
+  };
+  fit(kWindowS);
+  if (const double longer_s = WindowFor(Scatter(residuals)); longer_s > kWindowS) fit(longer_s);
   double sum = 0.0, sum_squares = 0.0, changes_squares = 0.0;
   for (size_t i = 0; i < n; ++i) {
     const double distance = late[i] - clock[i];

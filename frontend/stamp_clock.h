@@ -35,7 +35,8 @@ struct StampClock {
 //     than 1 % of the period (and 0.05 ms), or samples come late by more than half a period (or 5
 //     ms) and are caught up;
 //   - the clock is made of straight lines over 20 s each (oscillators of phones drift by up to
-//     5e-6 per second: 0.2 ms off such a line), through the earliest fifth of stretches of 0.25 s,
+//     5e-6 per second: 0.2 ms off such a line), or longer ones where latencies are so large that
+//     stamps tell such lines worse than that, through the earliest fifth of stretches of 0.25 s,
 //     faded into each other; it starts anew after gaps of more than 0.25 s.
 //
 // Clean stamps, also those with drift, steps and gaps, are kMeasured: leave them as they are.

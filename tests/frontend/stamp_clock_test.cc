@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/stamp_rate.h"
 #include "core/time.h"
 
 namespace camgyro {
@@ -61,7 +62,7 @@ double RmsError(const std::vector<int64_t>& found_ns, const std::vector<double>&
 
 // The error is that of the lower envelope, and of missing samples that are found some samples too
 // early or late: below a fifth of the recorded jitter, or 0.02 ms; at 1000 Hz with latencies of
-// several periods, where missing samples cannot be told, half of it.
+// several periods, where missing samples cannot be told, six tenths of it.
 TEST(StampClock, FindsTheClockBehindArrivals) {
   for (const double rate_hz : {25.0, 50.0, 100.0, 200.0, 400.0, 1000.0}) {
     for (const double latency_s : {1e-3, 3e-3}) {
@@ -78,7 +79,7 @@ TEST(StampClock, FindsTheClockBehindArrivals) {
         ASSERT_EQ(clock.sampled_ns.size(), stamps.size());
         EXPECT_TRUE(std::is_sorted(clock.sampled_ns.begin(), clock.sampled_ns.end()));
         const double recorded_s = RmsError(stamps, times);
-        const double allowed = rate_hz * latency_s < 1.0 || rate_hz < 400.0 ? 0.2 : 0.55;
+        const double allowed = rate_hz * latency_s < 1.0 || rate_hz < 400.0 ? 0.2 : 0.6;
         EXPECT_LT(RmsError(clock.sampled_ns, times), std::max(0.02e-3, allowed * recorded_s));
         EXPECT_NEAR(clock.report.jitter_s, recorded_s, 0.2 * recorded_s + 0.02e-3);
         if (allowed < 0.5) {
@@ -109,6 +110,77 @@ TEST(StampClock, MedianStampIsOnTime) {
     EXPECT_LT(clock.report.level_sigma_s, 0.05e-3);
     EXPECT_GT(clock.report.level_sigma_s, 2e-6);
   }
+}
+
+// The lower envelope of large latencies rises and falls by periods.
+TEST(StampClock, FindsNoMissingSampleWhereNoneIs) {
+  Sensor sensor;
+  sensor.missing_ratio = 0.0;
+  for (const double rate_hz : {100.0, 200.0, 400.0}) {
+    for (const double latency_s : {3e-3, 10e-3, 30e-3}) {
+      SCOPED_TRACE(testing::Message() << rate_hz << " Hz, latency " << latency_s << " s");
+      sensor.rate_hz = rate_hz;
+      int found = 0;
+      for (unsigned seed = 0; seed < 10; ++seed) {
+        std::mt19937 random(seed);
+        const std::vector<double> times = SamplingTimes(sensor, &random);
+        found += FindStampClock(Arrivals(times, latency_s, 30e-3, &random)).report.missing;
+      }
+      EXPECT_EQ(found, 0);
+    }
+  }
+}
+
+// The rate of a clock behind stamps of arrival is known as its sigma says, whatever the latencies;
+// the squared error of 24 draws has a mean of 1 within 0.3, and the quantile lines of these are
+// better known than those of Gaussian scatter, for which the sigma is made.
+TEST(StampClock, RateIsKnownAsItsSigmaSays) {
+  Sensor sensor;
+  sensor.drift_ppm = 0.0;
+  sensor.missing_ratio = 0.0;
+  for (const double duration_s : {10.0, 20.0, 40.0}) {
+    for (const double latency_s : {3e-3, 10e-3, 30e-3}) {
+      SCOPED_TRACE(testing::Message() << duration_s << " s, latency " << latency_s << " s");
+      sensor.duration_s = duration_s;
+      double sum_sq = 0.0;
+      constexpr int kDraws = 24;
+      for (unsigned seed = 0; seed < kDraws; ++seed) {
+        std::mt19937 random(seed);
+        const std::vector<double> times = SamplingTimes(sensor, &random);
+        const StampClock clock = FindStampClock(Arrivals(times, latency_s, 30e-3, &random));
+        ASSERT_EQ(clock.report.kind, StampKind::kArrival);
+        const double span_s = SecondsSince(clock.sampled_ns.front(), clock.sampled_ns.back());
+        const double rate = span_s / (times.back() - times.front()) - 1.0;
+        sum_sq += std::pow(rate / StampRateSigma(clock.report.residual_s, span_s), 2);
+      }
+      EXPECT_GT(sum_sq / kDraws, 0.25);
+      EXPECT_LT(sum_sq / kDraws, 1.4);
+    }
+  }
+}
+
+// Latencies of 30 ms tell lines over 20 s to some milliseconds at their ends: the clock of a minute
+// is one line, and not bent; small ones leave the clock free to drift.
+TEST(StampClock, LinesAreLongWhereLatenciesAreLarge) {
+  Sensor sensor;
+  sensor.drift_ppm = 0.0;
+  sensor.missing_ratio = 0.0;
+  const auto bend_s = [&](double latency_s, double drift_ppm) {
+    sensor.drift_ppm = drift_ppm;
+    std::mt19937 random(3);
+    const std::vector<double> times = SamplingTimes(sensor, &random);
+    const StampClock clock = FindStampClock(Arrivals(times, latency_s, 30e-3, &random));
+    if (clock.sampled_ns.size() != times.size()) return -1.0;
+    const auto error_s = [&](size_t i) {
+      return SecondsSince(1'000'000'000'000, clock.sampled_ns[i]) -
+             static_cast<double>(i) / sensor.rate_hz;
+    };
+    const size_t last = 2 * ((times.size() - 1) / 2);
+    return 0.5 * (error_s(0) + error_s(last)) - error_s(last / 2);
+  };
+  EXPECT_LT(std::abs(bend_s(30e-3, 0.0)), 1e-6);
+  // A period that grows by 50 ppm in a minute bends by 50e-6 * 60 s / 8.
+  EXPECT_NEAR(bend_s(1e-3, 50.0), 0.375e-3, 0.1e-3);
 }
 
 // Attitudes that a program has written when it came around to it: every 13th interval or so is a
