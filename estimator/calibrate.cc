@@ -10,6 +10,7 @@
 #include "core/format.h"
 #include "core/parallel.h"
 #include "estimator/doubts.h"
+#include "estimator/gyro_clock.h"
 #include "estimator/halves.h"
 #include "estimator/informative_pairs.h"
 #include "estimator/moving_tracks.h"
@@ -108,11 +109,7 @@ class CalibrationJob {
       report_.quality.noise_px = report_.trace.back().noise_px;
       report_.converged = true;
     }
-    if (recording_.gyro_stamps && recording_.gyro_stamps->repaired) {
-      // The delay is that of the gyro's clock, whose offset from its stamps is an estimate, too.
-      report_.calibration.covariance(kStateDelay, kStateDelay) +=
-          std::pow(recording_.gyro_stamps->level_sigma_s, 2);
-    }
+    AddGyroClock(recording_, &report_.calibration);
     MarkDetermined(attitudes_, report_.prior, &report_.calibration);
     if (!report_.converged) {  // delay and bias come from rates; the rest needs the fit
       for (size_t i = 0; i < kStateSize; ++i) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/usual_focal.h"
+#include "estimator/gyro_clock.h"
 #include "estimator/window/estimation_input.h"
 
 namespace camgyro {
@@ -55,6 +56,18 @@ Prior MakePrior(const Recording& recording, const StartResult& start) {
   return result;
 }
 
+namespace {
+
+void AddEffect(const EffectSetup& setup, const EffectEntry& entry, const std::string& shape,
+               const PairResidual& residual, EffectSet* effects) {
+  const std::shared_ptr<const Effect> effect = entry.make(setup, shape);
+  if (effect == nullptr) return;
+  if (effect->frees_frame_times() && !residual.facts().with_frame_times) return;
+  effects->Add(&entry, shape, effect);
+}
+
+}  // namespace
+
 Status AddStartEffects(const Recording& recording, const StartResult& start,
                        const std::string& list, const PairResidual& residual,
                        Calibration* calibration) {
@@ -64,10 +77,11 @@ Status AddStartEffects(const Recording& recording, const StartResult& start,
   if (!effects) return tl::unexpected(effects.error());
   for (const EffectEntry& entry : EffectCatalogue()) {
     if (!entry.found_at_start || effects->Has(entry.name) || !entry.found_at_start(setup)) continue;
-    const std::string shape = entry.shapes(setup).back();
-    const std::shared_ptr<const Effect> effect = entry.make(setup, shape);
-    if (effect->frees_frame_times() && !residual.facts().with_frame_times) continue;
-    effects->Add(&entry, shape, effect);
+    AddEffect(setup, entry, entry.shapes(setup).back(), residual, &*effects);
+  }
+  if (const std::string shape = ShapeOfGyroClock(recording);
+      !shape.empty() && !effects->Has("clock_skew") && residual.facts().with_effects) {
+    AddEffect(setup, *FindEffect("clock_skew"), shape, residual, &*effects);
   }
   if (effects->items().empty()) return {};
   calibration->effect_values = Eigen::VectorXd::Zero(effects->size());

@@ -21,7 +21,8 @@ Prior MakePrior(const Recording& recording, const StartResult& start);
 
 // Puts effects into a calibration that has none: those of a list (MakeEffects), and those that the
 // start has found (EffectEntry::found_at_start) and the residual can have, with the values where a
-// fit begins. Errors: the list's.
+// fit begins. A gyro's clock that was found behind stamps of arrival brings clock_skew, where its
+// rate is not known so well that it does not show. Errors: the list's.
 Status AddStartEffects(const Recording& recording, const StartResult& start,
                        const std::string& list, const PairResidual& residual,
                        Calibration* calibration);
