@@ -112,6 +112,11 @@ class PairGraph {
   // FrameNumber.
   std::vector<PairTimes> FrameTimes() const;
   static int64_t FrameNumber(double stamp_s);  // [ns]
+  // Searches the times of the frames of some pairs where they may be caught in a minimum that is
+  // not the deepest: a frame that is late by so much that most of its matches look wrong pulls no
+  // solve to its time, since the loss is bounded. Sets what is better. Does nothing where frames
+  // have no times of their own.
+  void SearchFrameTimes(const std::vector<int64_t>& ids);
   // Their spread, for the solves to come and for Estimate: of an effect's parameter, which no
   // residual depends on.
   void SetFrameTimeSpread(const Spread& spread);
@@ -173,6 +178,15 @@ class PairGraph {
   PairParameters SharedParameters() const;
   PairParameters ParametersOf(int64_t id, const Pair& pair) const;
   PairTimes FrameTimesOf(const Pair& pair) const;
+  // Share of a pair's matches that are within the loss.
+  double RightShare(int64_t id);
+  // What SearchFrameTimes makes small: bounded residuals with the priors of all that is the pair's
+  // own. residuals: of the pair.
+  double CostOfTimes(int64_t id, const Pair& pair, const std::vector<double>& residuals) const;
+  // Of a pair that has fewer right matches than `right_share`.
+  void SearchFrameTimesOf(int64_t id, double right_share);
+  // Moves times, direction and bend of a pair down to a minimum, at first without the loss.
+  void DescendWithoutLoss(int64_t id, Pair* pair);
   // State and effects as functionals of the blocks. Errors: kCannotEstimate without pairs.
   Result<std::vector<FactorGraph::Functional>> StateFunctionals(
       const std::optional<FrameTime>& at = std::nullopt) const;

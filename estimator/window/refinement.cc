@@ -181,6 +181,7 @@ class Refinement {
       } else if (facts_.has_direction) {
         AllResiduals(/*search=*/true);
       }
+      graph_->SearchFrameTimes(ids_);
       const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
