@@ -27,6 +27,9 @@ constexpr int kFewestLate = 3;            // samples
 constexpr double kWanderOfScatter = 4.0;  // a random walk over 20 s wanders by more
 constexpr double kWindowS = 20.0;
 constexpr double kDriftPerS = 5e-6;  // of a phone's oscillator
+// Less is not worth it: what stretches are off lines is a clock's own wander, too, which longer
+// ones follow less (phone-edge-hand: 0.74 ms off lines of 21 s, 0.81 ms off lines of 26 s).
+constexpr double kMuchLonger = 1.5;
 constexpr size_t kFewestInBlock = 16;
 constexpr double kBreakS = 0.25;
 constexpr double kEarlyInBlock = 0.05;  // quantile of a block's stamps that stands for it
@@ -206,6 +209,40 @@ void FitClock(const std::vector<int64_t>& number, const std::vector<double>& lat
   for (const LinePoint& p : points) residuals->push_back(p.y - at(p.x));
 }
 
+// The whole clock, which starts anew after gaps, and how far stretches are off it.
+std::vector<double> ClockBehind(const std::vector<int64_t>& number, const std::vector<double>& late,
+                                double period_s, std::vector<double>* residuals) {
+  const size_t n = number.size();
+  std::vector<double> clock(n, 0.0);
+  const auto fit = [&](double window_s) {
+    size_t begin = 0;
+    residuals->clear();
+    for (size_t i = 1; i <= n; ++i) {
+      if (i < n && static_cast<double>(number[i] - number[i - 1]) * period_s < kBreakS) continue;
+      FitClock(number, late, period_s, window_s, begin, i, &clock, residuals);
+      begin = i;
+    }
+  };
+  fit(kWindowS);
+  const double longer_s = WindowFor(Scatter(*residuals));
+  if (longer_s > kMuchLonger * kWindowS) fit(longer_s);
+  return clock;
+}
+
+// Distances of stamps from their clock, in a report.
+void ReportDistances(const std::vector<double>& late, const std::vector<double>& clock,
+                     StampReport* report) {
+  double sum = 0.0, sum_squares = 0.0;
+  for (size_t i = 0; i < late.size(); ++i) {
+    const double distance = late[i] - clock[i];
+    sum += distance;
+    sum_squares += distance * distance;
+    report->latest_s = std::max(report->latest_s, distance);
+  }
+  const auto count = static_cast<double>(late.size());
+  report->jitter_s = std::sqrt(std::max(0.0, sum_squares / count - sum * sum / (count * count)));
+}
+
 // Clear evidence that stamps are not the clock: see FindStampClock.
 bool IsLate(const std::vector<double>& late, double period_s, double scatter_s) {
   if (scatter_s > std::max(kScatterPeriods * period_s, kScatterS)) return true;
@@ -287,33 +324,17 @@ StampClock FindStampClock(const std::vector<int64_t>& stamps_ns, bool even_if_cl
   const bool is_late = IsLate(late, period_s, scatter_s);
   if (!is_late && !even_if_clean) return found;
 
-  std::vector<double> clock(n, 0.0), residuals;
-  const auto fit = [&](double window_s) {
-    size_t begin = 0;
-    residuals.clear();
-    for (size_t i = 1; i <= n; ++i) {
-      if (i < n && static_cast<double>(number[i] - number[i - 1]) * period_s < kBreakS) continue;
-      FitClock(number, late, period_s, window_s, begin, i, &clock, &residuals);
-      begin = i;
-    }
-  };
-  fit(kWindowS);
-  if (const double longer_s = WindowFor(Scatter(residuals)); longer_s > kWindowS) fit(longer_s);
-  double sum = 0.0, sum_squares = 0.0, changes_squares = 0.0;
-  for (size_t i = 0; i < n; ++i) {
-    const double distance = late[i] - clock[i];
-    sum += distance;
-    sum_squares += distance * distance;
-    report.latest_s = std::max(report.latest_s, distance);
-    if (i > 0) changes_squares += changes[i - 1] * changes[i - 1];
-  }
-  const double count = static_cast<double>(n);
-  report.jitter_s = std::sqrt(std::max(0.0, sum_squares / count - sum * sum / (count * count)));
+  std::vector<double> residuals;
+  const std::vector<double> clock = ClockBehind(number, late, period_s, &residuals);
+  ReportDistances(late, clock, &report);
+  double changes_squares = 0.0;
+  for (const double change : changes) changes_squares += change * change;
   report.residual_s = Scatter(residuals);
   if (is_late) {
-    report.kind = report.jitter_s > kWanderOfScatter * std::sqrt(changes_squares / count)
-                      ? StampKind::kIrregular
-                      : StampKind::kArrival;
+    report.kind =
+        report.jitter_s > kWanderOfScatter * std::sqrt(changes_squares / static_cast<double>(n))
+            ? StampKind::kIrregular
+            : StampKind::kArrival;
   }
   if (report.kind == StampKind::kIrregular) return found;
   const double level_s = MedianLateness(late, clock, &report.level_sigma_s);
