@@ -75,7 +75,6 @@ void SlidingWindow::ProcessPending() {
     const AddPairResult added = graph_.AddPair(next.pair);
     if (added == AddPairResult::kGyroTooLate) return;
     if (added == AddPairResult::kAdded) {
-      if (settled_) graph_.SearchFrameTimes({next_pair_id_});
       ++next_pair_id_;
       ++num_used_;
       Process(next);
@@ -95,7 +94,6 @@ void SlidingWindow::Process(const Pending& pair) {
   if (!settled_) {
     // The estimate still moves: the directions with it.
     graph_.AllResiduals(/*search=*/true);
-    graph_.SearchFrameTimes(graph_.pair_ids());
     UpdateNoise();
   }
   WindowUpdate update;
