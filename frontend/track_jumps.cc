@@ -167,13 +167,14 @@ TrackJumps RemoveTrackJumps(Recording* recording) {
   });
   TrackJumps jumps;
   for (size_t f = 0; f < frames.size(); ++f) {
-    Points kept;
-    for (size_t i = 0; i < frames[f].size(); ++i) {
-      if (!is_off[f][i]) kept.push_back(frames[f][i]);
+    Points& points = frames[f];
+    size_t kept = 0;  // in their place: a vector that grows holds up to twice its points
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (!is_off[f][i]) points[kept++] = points[i];
     }
-    jumps.points += frames[f].size();
-    jumps.off += frames[f].size() - kept.size();
-    frames[f] = std::move(kept);
+    jumps.points += points.size();
+    jumps.off += points.size() - kept;
+    points.resize(kept);
   }
   // Now that wrong points contradict nobody any more.
   ParallelFor(frames.size(), [&](size_t f) {
