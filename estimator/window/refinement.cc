@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/free_memory.h"
 #include "core/parallel.h"
 #include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
@@ -272,6 +273,7 @@ class Refinement {
         return step < kSettledStep;
       };
     }
+    GiveBackFreeMemory();  // of the covariances, before the Jacobian takes as much again
     return graph_->Solve(options);
   }
 
@@ -329,7 +331,9 @@ class Refinement {
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                        const Calibration& start, const Prior& prior,
                        const RefinementOptions& options) {
-  return Refinement(input, pairs, start, prior, options).Run();
+  Result<Refined> refined = Refinement(input, pairs, start, prior, options).Run();
+  GiveBackFreeMemory();
+  return refined;
 }
 
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
