@@ -77,11 +77,12 @@ double LogDeterminant(const Matrix6d& information) {
 
 double RefinementBytes(const TimedPair& pair, const PairGraphOptions& options) {
   constexpr double kShared = 20.0;  // columns: lens, shutter, mounting, bias, direction, bend
-  constexpr double kTimesHeld = 4.0, kMatchesHeld = 4.0;
+  constexpr double kTimesHeld = 2.0, kMatchesHeld = 4.0;
   // Of the rates, at both ends and for the readout, of which nothing is known here, a few more.
   const double rates = 4.0 + (pair.time_b_s - pair.time_a_s) / options.rate_step_s;
-  return static_cast<double>(pair.num_matches) *
-         (kTimesHeld * (kShared + 3.0 * rates) * sizeof(double) + kMatchesHeld * sizeof(Match));
+  const double columns = kShared + 3.0 * rates;
+  return sizeof(double) * columns * (kTimesHeld * pair.num_matches + columns) +
+         kMatchesHeld * sizeof(Match) * pair.num_matches;
 }
 
 double BytesOf(const Recording& recording) {

@@ -21,10 +21,9 @@ struct PairLimits {
 
 // What a pair takes of memory in a refinement, about: for each match its residual's derivatives, by
 // what all pairs share, by the pair's direction and bend, and by the rates of the gyro from its
-// first row to its last; and the match itself some times. (heaptrack, one minute of walking with
-// 150 tracks, pairs 0.17 s apart: 434 bytes for the derivatives once. Ceres holds them once or
-// twice, and memory grows further while fit follows fit: of 485,000 matches it was seen at 2.3 kB
-// for each, docs/lab/performance.md, where this says 1.9.)
+// first row to its last, twice, since Ceres appends the damping of a step to a copy of them; half
+// of the products of these columns with each other, in the normal equations and in their factor;
+// and each match some times. (docs/lab/performance.md has what was measured.)
 double RefinementBytes(const TimedPair& pair, const PairGraphOptions& options);
 
 // What a recording takes of memory with its outline, about.

@@ -56,8 +56,10 @@ TEST(InformativePairs, StayWithinTheirMemory) {
   const EstimationInput input = Turns();
   double all = 0.0;
   for (const TimedPair& pair : input.pairs) all += RefinementBytes(pair, {});
-  // Of a match: four times 20 + 3 (4 + 0.1 s / 0.025 s) derivatives, and four times itself.
-  EXPECT_NEAR(all, 990.0 * 50.0 * (4.0 * 44.0 * 8.0 + 4.0 * sizeof(Match)), 1e-6 * all);
+  // Of a match: twice its 20 + 3 (4 + 0.1 s / 0.025 s) derivatives, and four times itself. Of a
+  // pair: half of their products, twice.
+  EXPECT_NEAR(all, 990.0 * (50.0 * (2.0 * 44.0 * 8.0 + 4.0 * sizeof(Match)) + 44.0 * 44.0 * 8.0),
+              1e-6 * all);
   PairLimits limits;
   limits.bytes = all;
   EXPECT_EQ(InformativePairs(input, 0.0, limits).size(), 990u);
