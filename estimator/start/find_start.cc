@@ -150,6 +150,20 @@ void SetClockRate(const ClockRate& rate, double lag_s, double offset_s, StartRes
       " per second, and clock_skew is part of the model");
 }
 
+// Why there is too little to search with.
+std::string TooLittle(const CameraRates& camera, double span_s, const StartOptions& options) {
+  const double all_s = camera.frame_times_s.empty() ? 0.0 : camera.frame_times_s.back();
+  std::string reason = "too short: ";
+  if (all_s > 2.0 * options.min_span_s) {
+    reason = "the pictures of " + Seconds(all_s) +
+             " could not be followed (dark, blurred, without contrast, or in light that "
+             "flickers): ";
+  }
+  return reason + std::to_string(camera.size()) + " camera rotations in " + Seconds(span_s) +
+         ", expected at least " + std::to_string(options.min_pairs) + " in " +
+         Seconds(options.min_span_s);
+}
+
 // The two streams of a recording, ready for a search.
 struct Streams {
   RateAlignment alignment;
@@ -223,9 +237,7 @@ Result<StartResult> FindStart(const Recording& recording,
   for (const int b : camera.frame_b) last_s = std::max(last_s, camera.frame_times_s[b]);
   const double span_s = last_s - first_s;
   if (camera.size() < options.min_pairs || span_s < options.min_span_s) {
-    return CannotEstimate("too short: " + std::to_string(camera.size()) + " camera rotations in " +
-                          Seconds(span_s) + ", expected at least " +
-                          std::to_string(options.min_pairs) + " in " + Seconds(options.min_span_s));
+    return CannotEstimate(TooLittle(camera, span_s, options));
   }
   const double noise = std::sqrt(3.0) * gyro.Noise(span_s / camera.size());
   // A difference of integers, so that large stamps lose nothing.

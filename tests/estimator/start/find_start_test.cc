@@ -238,7 +238,9 @@ TEST(FindStartRefuses, ShortRecordings) {
   truth.duration_s = 10.0;
   Simulated s = Simulate(SmoothRandomRate(1, 0.8), truth, 1);
   s.rotations.clear();
-  ExpectRefused(s, "too short: 0 camera rotations");
+  ExpectRefused(s,
+                "could not be followed (dark, blurred, without contrast, or in light that "
+                "flickers): 0 camera rotations");
   s.recording.gyro.clear();
   ExpectRefused(s, "gyro samples");
 }
