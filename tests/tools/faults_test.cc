@@ -9,9 +9,11 @@
 #include <cstdio>
 #include <functional>
 #include <map>
+#include <opencv2/imgcodecs.hpp>
 #include <regex>
 #include <set>
 
+#include "core/so3.h"
 #include "tests/tools/run_camgyro.h"
 
 namespace camgyro {
@@ -20,6 +22,7 @@ namespace {
 using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr char kScenario[] =
     "duration_s: 5\nmotion: {kind: walking}\n"
@@ -66,12 +69,15 @@ class FaultsTest : public CamgyroTest {
     Edit("cam0/tracks.csv", edit);
   }
 
-  // The result is within four sigmas of the truth, and of that of the undisturbed recording.
+  // The result of `a` is within four sigmas of the truth, and of that of an undisturbed recording.
   RunResult ExpectRecovery(const std::string& fault) const {
+    return ExpectRecovery(fault, Undisturbed());
+  }
+  RunResult ExpectRecovery(const std::string& fault, const Estimate& without) const {
     RunResult run = Run("calibrate a --out=with");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     if (run.exit_code != 0) return run;
-    const Estimate with = Read("with"), without = Undisturbed();
+    const Estimate with = Read("with");
     std::string moved;
     for (size_t i = 0; i < 3; ++i) {
       EXPECT_LT(std::abs(with.value[i] - kTruth[i]), 4.0 * with.sigma[i]) << i;
@@ -156,6 +162,85 @@ TEST_F(FaultsTest, HalfOfTheMatchesIsWrong) {
   scenario.insert(scenario.rfind('}'), ", outlier_fraction: 0.29");
   Simulate(scenario, "a");
   ExpectRecovery("50 % of the matches wrong");
+}
+
+// Five seconds of motion with a rest in the middle, which begins and ends within half a second.
+std::string MotionWithRest(double rest_s) {
+  constexpr double kMoves = 2.0, kStops = 0.5, kStep = 0.02;
+  std::string tum;
+  double moved_s = 0.0;
+  for (double time_s = 0.0; time_s < 6.0 + rest_s; time_s += kStep) {
+    const double into_stop = std::min(time_s - kMoves, kMoves + 2.0 * kStops + rest_s - time_s);
+    const double speed = 0.5 + 0.5 * std::cos(M_PI * std::clamp(into_stop / kStops, 0.0, 1.0));
+    const Eigen::Vector3d turn(0.10 * std::sin(5.7 * moved_s), 0.08 * std::sin(8.2 * moved_s + 1.0),
+                               0.12 * std::sin(4.4 * moved_s + 2.0));
+    const Eigen::Quaterniond q = Exp(turn);
+    char row[200];
+    std::snprintf(row, sizeof(row), "%.3f %.6f %.6f 0 %.9f %.9f %.9f %.9f\n", time_s, 1.4 * moved_s,
+                  0.1 * std::sin(3.0 * moved_s), q.x(), q.y(), q.z(), q.w());
+    tum += row;
+    moved_s += speed * kStep;
+  }
+  return tum;
+}
+
+TEST_F(FaultsTest, TheCameraRestsForMinutes) {
+  const auto simulate = [&](double rest_s, const std::string& name) {
+    std::ofstream(Path(name + ".tum")) << MotionWithRest(rest_s);
+    std::string scenario = kScenario;
+    scenario.replace(0, scenario.find("camera:"),
+                     "duration_s: " + std::to_string(5.0 + rest_s) +
+                         "\nmotion: {kind: file, file: " + Path(name + ".tum") + "}\n");
+    Simulate(scenario, name);
+  };
+  simulate(0.0, "b");
+  ASSERT_EQ(Run("calibrate b --out=without --quiet").exit_code, 0);
+  simulate(120.0, "a");
+  const RunResult run = ExpectRecovery("the camera rests for two minutes", Read("without"));
+  EXPECT_THAT(run.out, Not(HasSubstr("doubt")));
+}
+
+// Light of 100 Hz makes bands that move from picture to picture; a control of the exposure that
+// does not settle makes every other picture brighter.
+TEST_F(FaultsTest, TheLightFlickers) {
+  Simulate(
+      "duration_s: 5\nscene: {kind: room}\n"
+      "motion: {kind: handheld, speed_m_s: 0.9, path_radius_m: 1.5, heading_deg: 60}\n"
+      "camera: {resolution: [320, 240], focal_px: 290, rate_hz: 30, exposure_s: 0.004}\n"
+      "video: {format: png}\n",
+      "sound");
+  ASSERT_EQ(Run("calibrate sound --out=without --quiet").exit_code, 0);
+  // light: of a row, by its time; 1 without flicker.
+  const auto flicker = [&](const std::function<double(double time_s, int frame)>& light) {
+    std::filesystem::remove_all(Path("a"));
+    std::filesystem::copy(Path("sound"), Path("a"), std::filesystem::copy_options::recursive);
+    int frame = 0;
+    EditCsv("sound/cam0/data.csv", [&](int, Row& row) {
+      const std::string file = Path("a/cam0/data/" + row[1]);
+      cv::Mat picture = cv::imread(file, cv::IMREAD_GRAYSCALE);
+      EXPECT_FALSE(picture.empty()) << file;
+      for (int v = 0; v < picture.rows; ++v) {
+        picture.row(v) *= light(1e-9 * std::stod(row[0]) + kTruth[1] * v / picture.rows, frame);
+      }
+      EXPECT_TRUE(cv::imwrite(file, picture));
+      ++frame;
+      return true;
+    });
+    EXPECT_EQ(frame, 151);
+  };
+  const auto bands = [](double depth) {
+    return
+        [depth](double time_s, int) { return 1.0 + depth * std::sin(2.0 * M_PI * 100.0 * time_s); };
+  };
+  flicker(bands(0.1));
+  ExpectRecovery("bands of light, 10 %", Read("without"));
+  flicker([](double, int frame) { return frame % 2 == 0 ? 0.85 : 1.15; });
+  ExpectRecovery("every other picture is brighter by 30 %", Read("without"));
+  // Deeper ones take the tracker's points away, which is said.
+  flicker(bands(0.3));
+  const RunResult deep = Run("calibrate a --out=deep");
+  EXPECT_EQ(deep.exit_code, 4);
+  EXPECT_THAT(deep.err, HasSubstr("could not be followed"));
 }
 
 // No constant delay fits both parts, and none is given.
@@ -253,7 +338,8 @@ TEST(FaultsPage, NamesTests) {
   for (const std::string own :
        {"CameraPauses", "GyroHasAGap", "AThirdOfTheFramesIsDropped", "GyroChangesItsRate",
         "FeaturesAreLostAndFoundAgain", "HalfOfTheSceneMovesByItself", "HalfOfTheMatchesIsWrong",
-        "AClockSteps", "InterruptedOrKilled", "DiskFull"}) {
+        "AClockSteps", "InterruptedOrKilled", "DiskFull", "TheCameraRestsForMinutes",
+        "TheLightFlickers"}) {
     EXPECT_NE(text.find("`FaultsTest." + own + "`"), std::string::npos) << own;
   }
 }
