@@ -28,7 +28,7 @@ class ClockSkew final : public Effect {
   const double start_ppm_, from_s_;  // the latter by the camera's clock
 };
 
-std::shared_ptr<const Effect> Make(const EffectSetup& setup, const std::string& shape) {
+std::shared_ptr<const Effect> MakeClockSkew(const EffectSetup& setup, const std::string& shape) {
   if (shape == "constant") {
     const double start_ppm = 1e6 * setup.clock_skew;
     return std::make_shared<ClockSkew>(std::max(kCrystalPpm, std::abs(start_ppm)), start_ppm,
@@ -56,7 +56,7 @@ EffectEntry ClockSkewEntry() {
       "camera and gyro are timed by clocks of different speed: the delay grows steadily",
       "multiply camera time by (1 + skew), or re-estimate the delay all the time"};
   entry.shapes = [](const EffectSetup&) { return std::vector<std::string>{"constant"}; };
-  entry.make = Make;
+  entry.make = MakeClockSkew;
   entry.found_at_start = [](const EffectSetup& setup) { return setup.clock_skew != 0.0; };
   return entry;
 }
