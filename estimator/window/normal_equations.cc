@@ -46,12 +46,13 @@ std::vector<BlockId> BlocksOf(const std::vector<const Factor*>& factors) {
 
 namespace {
 
-// Frames' own times and rates as one, from the last to the first, by the first factor that touches
-// them: both couple a pair with the next one, and if all of the one kind went before the other,
-// every rate would in the end be coupled with every other.
+// Frames' own times, rates and biases as one, from the last to the first, by the first factor that
+// touches them: each couples a pair with the next one, and if all of one kind went before another,
+// every rate would in the end be coupled with every later frame's time, or bias.
 void OrderAlongTime(const std::vector<const Factor*>& factors, std::vector<BlockId>* ids) {
   const auto is_timed = [](const BlockId& id) {
-    return id.kind == BlockKind::kFrameTime || id.kind == BlockKind::kRates;
+    return id.kind == BlockKind::kFrameTime || id.kind == BlockKind::kRates ||
+           id.kind == BlockKind::kBias;
   };
   std::map<BlockId, size_t> first;
   for (size_t f = 0; f < factors.size(); ++f) {
@@ -59,10 +60,9 @@ void OrderAlongTime(const std::vector<const Factor*>& factors, std::vector<Block
       if (is_timed(id)) first.emplace(id, f);
     }
   }
-  // The two kinds are neighbours.
+  // The kinds are neighbours.
   const auto begin = std::find_if(ids->begin(), ids->end(), is_timed);
   const auto end = std::find_if_not(begin, ids->end(), is_timed);
-  if (begin == end || begin->kind != BlockKind::kFrameTime) return;  // rates are in order
   std::stable_sort(begin, end,
                    [&](const BlockId& a, const BlockId& b) { return first.at(a) > first.at(b); });
 }
