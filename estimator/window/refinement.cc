@@ -182,7 +182,8 @@ class Refinement {
       } else if (facts_.has_direction) {
         AllResiduals(/*search=*/true);
       }
-      graph_->SearchFrameTimes(ids_);
+      // A fit that has settled has done so, and it takes long.
+      if (options_.latents == nullptr) graph_->SearchFrameTimes(ids_);
       const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
