@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -112,11 +113,11 @@ class PairGraph {
   // FrameNumber.
   std::vector<PairTimes> FrameTimes() const;
   static int64_t FrameNumber(double stamp_s);  // [ns]
-  // Searches the times of the frames of some pairs where they may be caught in a minimum that is
-  // not the deepest: a frame that is late by so much that most of its matches look wrong pulls no
-  // solve to its time, since the loss is bounded. Sets what is better. Does nothing where frames
-  // have no times of their own.
-  void SearchFrameTimes(const std::vector<int64_t>& ids);
+  // Searches the times of frames where they may be caught in a minimum that is not the deepest: a
+  // frame that is late by so much that most of its matches look wrong pulls no solve to its time,
+  // since the loss is bounded. Sets what is better. Does nothing where frames have no times of
+  // their own.
+  void SearchFrameTimes();
   // Their spread, for the solves to come and for Estimate: of an effect's parameter, which no
   // residual depends on.
   void SetFrameTimeSpread(const Spread& spread);
@@ -158,8 +159,8 @@ class PairGraph {
   // Beside each other for different pairs, with bearings of their own to work in.
   std::vector<double> Residuals(int64_t id, bool search, PairBearings* bearings);
   CrossFit CrossFitOf(int64_t id, PairBearings* bearings);
-  template <typename Body>
-  void ForAllPairs(const Body& body);
+  // body(place in the order of pair_ids, id, bearings to work in), beside each other.
+  void ForAllPairs(const std::function<void(size_t, int64_t, PairBearings*)>& body);
   void AddStatePrior(const Prior& prior);
   void AddEffectsPrior();
   PairEffects EffectsNow() const;
@@ -179,14 +180,15 @@ class PairGraph {
   PairParameters ParametersOf(int64_t id, const Pair& pair) const;
   PairTimes FrameTimesOf(const Pair& pair) const;
   // Share of a pair's matches that are within the loss.
-  double RightShare(int64_t id);
+  double RightShare(int64_t id, PairBearings* bearings);
   // What SearchFrameTimes makes small: bounded residuals with the priors of all that is the pair's
   // own. residuals: of the pair.
   double CostOfTimes(int64_t id, const Pair& pair, const std::vector<double>& residuals) const;
-  // Of a pair that has fewer right matches than `right_share`.
-  void SearchFrameTimesOf(int64_t id, double right_share);
+  // Of a pair that has fewer right matches than `right_share`; touched: the pairs that have one of
+  // its frames. False if nothing better was found.
+  bool SearchFrameTimesOf(int64_t id, const std::vector<int64_t>& touched, double right_share);
   // Moves times, direction and bend of a pair down to a minimum, at first without the loss.
-  void DescendWithoutLoss(int64_t id, Pair* pair);
+  void DescendWithoutLoss(int64_t id, Pair* pair, PairBearings* bearings);
   // State and effects as functionals of the blocks. Errors: kCannotEstimate without pairs.
   Result<std::vector<FactorGraph::Functional>> StateFunctionals(
       const std::optional<FrameTime>& at = std::nullopt) const;
@@ -209,6 +211,8 @@ class PairGraph {
   std::shared_ptr<double> frame_time_spread_s_;
   double frame_time_spread_sigma_s_ = 0.0, shared_frame_time_s2_ = 0.0;
   std::map<int64_t, FactorGraph::FactorKey> frame_time_priors_;  // by frame
+  // By pair, the share of right matches when SearchFrameTimes found nothing better.
+  std::map<int64_t, double> searched_in_vain_;
   std::map<int64_t, Pair> pairs_;
   PairBearings bearings_;  // of Residuals, which are called often: kept allocated
 };

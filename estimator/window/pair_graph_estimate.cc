@@ -65,9 +65,7 @@ CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
   return fit;
 }
 
-// body(index of the pair, its id, bearings to work in), for some pairs beside others.
-template <typename Body>
-void PairGraph::ForAllPairs(const Body& body) {
+void PairGraph::ForAllPairs(const std::function<void(size_t, int64_t, PairBearings*)>& body) {
   constexpr size_t kTogether = 16;  // with the same bearings, which are large to allocate
   const std::vector<int64_t> ids = pair_ids();
   ParallelFor((ids.size() + kTogether - 1) / kTogether, [&](size_t part) {

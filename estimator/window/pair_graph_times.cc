@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 
+#include "core/parallel.h"
 #include "core/robust_statistics.h"
 #include "estimator/window/pair_blocks.h"
 #include "estimator/window/pair_graph.h"
@@ -171,7 +173,7 @@ double PairGraph::CostOfTimes(int64_t id, const Pair& pair,
   return cost;
 }
 
-void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair) {
+void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair, PairBearings* bearings) {
   // Noise that is taken for so many times larger makes matches right that are 28 px off at 0.5 px:
   // 20 ms of a turn by 2 rad/s.
   constexpr double kWidest = 16.0;
@@ -186,7 +188,8 @@ void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair) {
   }
   for (double width = kWidest; width >= 1.0; width *= 0.5) {
     SetSigma(id, width * sigma);
-    if (width == kWidest) Residuals(id, /*search=*/true);  // the direction, of these times
+    // The direction, of these times.
+    if (width == kWidest) Residuals(id, /*search=*/true, bearings);
     const double information = std::pow(width * *frame_time_spread_s_, -2);
     for (int step = 0; step < kSteps; ++step) {
       equations.Begin();
@@ -202,8 +205,8 @@ void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair) {
   SetSigma(id, sigma);
 }
 
-double PairGraph::RightShare(int64_t id) {
-  const std::vector<double> residuals = Residuals(id, /*search=*/false);
+double PairGraph::RightShare(int64_t id, PairBearings* bearings) {
+  const std::vector<double> residuals = Residuals(id, /*search=*/false, bearings);
   const auto right = std::count_if(residuals.begin(), residuals.end(), [&](double r) {
     return std::abs(r) <= options_.inlier_sigmas();
   });
@@ -211,21 +214,15 @@ double PairGraph::RightShare(int64_t id) {
                            : static_cast<double>(right) / static_cast<double>(residuals.size());
 }
 
-void PairGraph::SearchFrameTimesOf(int64_t id, double right_share) {
+bool PairGraph::SearchFrameTimesOf(int64_t id, const std::vector<int64_t>& touched,
+                                   double right_share) {
   // [sigmas^2] A solve ends within less of the minimum.
   constexpr double kBetter = 1.0;
   // Where descents begin, in spreads from where the times are now.
   constexpr std::array<double, 3> kStarts = {0.0, -2.5, 2.5};
-  if (RightShare(id) >= right_share) return;
+  PairBearings bearings;
+  if (RightShare(id, &bearings) >= right_share) return true;
   Pair& pair = pairs_.at(id);
-  std::vector<int64_t> touched;  // frames may be in other pairs, too
-  for (const auto& [other, also] : pairs_) {
-    for (const int64_t frame : also.frame_times) {
-      if (frame != pair.frame_times[0] && frame != pair.frame_times[1]) continue;
-      touched.push_back(other);
-      break;
-    }
-  }
   std::vector<BlockId> own = {FrameTimeBlock(pair.frame_times[0]),
                               FrameTimeBlock(pair.frame_times[1])};
   for (const int64_t one : touched) {
@@ -235,7 +232,7 @@ void PairGraph::SearchFrameTimesOf(int64_t id, double right_share) {
   const auto cost = [&] {
     double sum = 0.0;
     for (const int64_t one : touched) {
-      const std::vector<double> now = Residuals(one, /*search=*/true);
+      const std::vector<double> now = Residuals(one, /*search=*/true, &bearings);
       if (now.empty()) return std::numeric_limits<double>::infinity();
       sum += CostOfTimes(one, pairs_.at(one), now);
     }
@@ -252,30 +249,78 @@ void PairGraph::SearchFrameTimesOf(int64_t id, double right_share) {
   double least = cost() - kBetter;
   const std::vector<Eigen::VectorXd> before = values();
   std::vector<Eigen::VectorXd> best = before;
-  bool right = false;
+  bool right = false, found = false;
   for (size_t k = 0; k < kStarts.size() * kStarts.size() && !right; ++k) {
     set(before);
     graph_.value(own[0])[0] += kStarts.at(k % kStarts.size()) * *frame_time_spread_s_;
     graph_.value(own[1])[0] += kStarts.at(k / kStarts.size()) * *frame_time_spread_s_;
-    DescendWithoutLoss(id, &pair);
+    DescendWithoutLoss(id, &pair, &bearings);
     const double here = cost();
     if (!(here < least)) continue;
     least = here;
     best = values();
-    right = RightShare(id) >= right_share;
+    found = true;
+    right = RightShare(id, &bearings) >= right_share;
   }
   set(best);
+  return found;
 }
 
-void PairGraph::SearchFrameTimes(const std::vector<int64_t>& ids) {
+void PairGraph::SearchFrameTimes() {
   // Of the share that pairs usually have: where so many matches are right, the times are as well.
-  // It saves time only.
   constexpr double kSurelyRight = 0.93;
+  // Of the share when a search was in vain: it would be again. Both save time only.
+  constexpr double kHardlyWorse = 0.9;
   if (!has_frame_times() || !residual().facts().has_direction) return;
-  std::vector<double> shares;
-  for (const auto& entry : pairs_) shares.push_back(RightShare(entry.first));
-  const double right_share = kSurelyRight * MedianInPlace(&shares);
-  for (const int64_t id : ids) SearchFrameTimesOf(id, right_share);
+  std::vector<double> shares(pairs_.size());
+  ForAllPairs(
+      [&](size_t i, int64_t id, PairBearings* bearings) { shares[i] = RightShare(id, bearings); });
+  std::vector<double> sorted = shares;
+  const double right_share = kSurelyRight * MedianInPlace(&sorted);
+
+  std::map<int64_t, std::vector<int64_t>> pairs_of_frames;
+  for (const auto& [id, pair] : pairs_) {
+    for (const int64_t frame : pair.frame_times) pairs_of_frames[frame].push_back(id);
+  }
+  // Searches that know a frame in common follow each other; others go beside each other.
+  struct Search {
+    int64_t id = 0;
+    double share = 0.0;
+    std::vector<int64_t> touched;  // pairs with a frame of this one
+    bool found = false;
+  };
+  std::vector<std::vector<Search>> turns;
+  std::map<int64_t, size_t> next_turn;  // of frames
+  size_t i = 0;
+  for (const auto& [id, pair] : pairs_) {
+    const double share = shares[i++];
+    const auto in_vain = searched_in_vain_.find(id);
+    if (share >= right_share ||
+        (in_vain != searched_in_vain_.end() && share >= kHardlyWorse * in_vain->second)) {
+      continue;
+    }
+    std::set<int64_t> touched, known;
+    for (const int64_t frame : pair.frame_times) {
+      touched.insert(pairs_of_frames[frame].begin(), pairs_of_frames[frame].end());
+    }
+    for (const int64_t other : touched) {
+      const std::vector<int64_t>& frames = pairs_.at(other).frame_times;
+      known.insert(frames.begin(), frames.end());
+    }
+    size_t turn = 0;
+    for (const int64_t frame : known) turn = std::max(turn, next_turn[frame]);
+    for (const int64_t frame : known) next_turn[frame] = turn + 1;
+    if (turn == turns.size()) turns.emplace_back();
+    turns[turn].push_back({id, share, {touched.begin(), touched.end()}});
+  }
+  for (std::vector<Search>& turn : turns) {
+    ParallelFor(turn.size(), [&](size_t k) {
+      turn[k].found = SearchFrameTimesOf(turn[k].id, turn[k].touched, right_share);
+    });
+    for (const Search& search : turn) {
+      if (!search.found) searched_in_vain_[search.id] = search.share;
+    }
+  }
 }
 
 std::vector<PairTimes> PairGraph::FrameTimes() const {

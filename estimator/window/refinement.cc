@@ -183,7 +183,7 @@ class Refinement {
         AllResiduals(/*search=*/true);
       }
       // A fit that has settled has done so, and it takes long.
-      if (options_.latents == nullptr) graph_->SearchFrameTimes(ids_);
+      if (options_.latents == nullptr) graph_->SearchFrameTimes();
       const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 

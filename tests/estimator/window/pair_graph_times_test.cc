@@ -50,7 +50,7 @@ TEST(PairGraph, FindsTheTimesOfFramesThatAreVeryLate) {
     for (const TimedRate& rate : input.rates) graph.AddRate(rate);
     for (const TimedPair& pair : input.pairs) graph.AddPair(pair);
     graph.AllResiduals(/*search=*/true);
-    if (search) graph.SearchFrameTimes(graph.pair_ids());
+    if (search) graph.SearchFrameTimes();
     EXPECT_TRUE(graph.Solve({}).usable);
     const double delay_s = graph.Estimate().delay_s;
     double worst = 0.0;
