@@ -15,6 +15,7 @@
 #include "estimator/informative_pairs.h"
 #include "estimator/moving_tracks.h"
 #include "estimator/online_pass.h"
+#include "estimator/times_between.h"
 
 namespace camgyro {
 namespace {
@@ -282,7 +283,8 @@ class CalibrationJob {
     report_.calibration = refined->calibration;
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;
-    report_.frame_times = refined->frame_times;
+    report_.frame_times =
+        TimesOfAllFrames(recording_, *refined, refinement, {options_.most_refined_pairs, left});
     if (refined->frame_wander.slow_s > 0.0) {
       report_.notes.push_back(Describe(refined->frame_wander));
     }

@@ -18,11 +18,13 @@ SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
   const auto shares_of = [&](const PairSelection& selection, const ShareLimits& limits) {
     return MakeShares(*in.recording, OutlineOf(*in.recording, selection), limits);
   };
-  map_pairs_ =
-      shares_of(SelectPairs(*in.recording, kNearGap), {kMostFitPairs, kMostChoicePairs}).choice;
+  const bool reanchored = in.recording->match_noise == MatchNoise::kSecondImage;
+  const PairSelection near = SelectPairs(*in.recording, reanchored ? kNearestGap : kNearGap);
+  map_pairs_ = shares_of(near, {kMostFitPairs, kMostChoicePairs}).choice;
   if (in.recording->HasOnlyAttitudes()) return;
-  // As far apart as the others, so that no two of them share noise.
-  const int stride = SelectPairs(*in.recording).stride;
+  // So that no two of them share noise: as far apart as the others, and where a tracker re-anchors,
+  // one after the other.
+  const int stride = reanchored ? kNearestGap : SelectPairs(*in.recording).stride;
   const Shares nearest = shares_of({kNearestGap, stride}, {kMostFitPairs, kMostFitPairs});
   near_pairs_ = Joined(nearest.fit);
   const std::vector<TimedPair> choice = Joined(nearest.choice);

@@ -11,13 +11,12 @@
 namespace camgyro {
 
 PairSelection SelectPairs(const Recording& recording, int longest_gap, int least_pairs) {
-  constexpr double kLongestS = 0.2;
-  constexpr int kStride = 2;
+  // Of 10 frames per second and their multiples, with their stamps' rounding.
+  constexpr double kLongestS = 0.2, kLongestReanchoredS = 0.101;
   PairSelection selection;
-  if (!recording.matches.empty() || recording.tracks.empty() ||
-      recording.match_noise != MatchNoise::kBothImages) {
-    return selection;
-  }
+  if (!recording.matches.empty() || recording.tracks.empty()) return selection;
+  const bool reanchored = recording.match_noise == MatchNoise::kSecondImage;
+  const double longest_s = reanchored ? kLongestReanchoredS : kLongestS;
   const auto matches = [&](int gap) {
     size_t count = 0;
     for (size_t b = static_cast<size_t>(gap); b < recording.tracks.size(); ++b) {
@@ -28,12 +27,13 @@ PairSelection SelectPairs(const Recording& recording, int longest_gap, int least
   const double interval_s = MedianInterval(recording.frames);
   const int frames = static_cast<int>(recording.tracks.size());
   const double neighbours = matches(1);
-  for (int gap = 3; gap <= longest_gap; gap += 2) {
-    if (gap * interval_s > kLongestS || frames < least_pairs * kStride + gap ||
+  for (int gap = reanchored ? 2 : 3; gap <= longest_gap; gap += reanchored ? 1 : 2) {
+    const int stride = reanchored ? gap : 2;
+    if (gap * interval_s > longest_s || frames < least_pairs * stride + gap ||
         matches(gap) < kLeastMatchesOfGap * neighbours) {
       break;
     }
-    selection = {gap, kStride};
+    selection = {gap, stride};
   }
   return selection;
 }

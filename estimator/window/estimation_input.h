@@ -22,6 +22,9 @@ struct EstimationInput {
 struct PairSelection {
   int gap = 1;
   int stride = 1;
+
+  // Odd gaps from every second frame have every frame; pairs one after the other have their ends.
+  bool leaves_frames_out() const { return gap > 1 && stride == gap; }
 };
 
 constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
@@ -30,9 +33,13 @@ constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
 // observation does not, so that neighbours tell least, and are biased where their parallax is as
 // small as the noise (docs/lab/benchmark.md). The gap is the longest up to 0.2 s that keeps 60 % of
 // the neighbours' matches and leaves `least_pairs`. No two pairs share noise: gaps are odd and
-// pairs begin at even frames, so that every observation is in one pair. Neighbours without tracks,
-// and where a tracker re-anchors at every frame (MatchNoise::kSecondImage): its error grows with
-// the gap as fast as what is to be seen.
+// pairs begin at even frames, so that every observation is in one pair. Neighbours without tracks.
+//
+// Where a tracker re-anchors at every frame (MatchNoise::kSecondImage), the error of a gap is the
+// sum of those of its frames: it grows as the root of the gap, slower than what is to be seen, and
+// each frame's is in one pair if a pair begins where the one before has ended. The longest gap is
+// 0.1 s there: up to it, sigmas are those of neighbours, or smaller, in a half to two thirds of the
+// time, and beyond it they grow (docs/lab/pairs.md).
 PairSelection SelectPairs(const Recording& recording, int longest_gap = 10, int least_pairs = 100);
 
 // Pairs from matches, tracks (which of them: `selection`) or attitudes. Matches come in the pairs

@@ -183,7 +183,9 @@ class Refinement {
         AllResiduals(/*search=*/true);
       }
       // A fit that has settled has done so, and it takes long.
-      if (options_.latents == nullptr) graph_->SearchFrameTimes();
+      if (options_.latents == nullptr || options_.latents->planes.empty()) {
+        graph_->SearchFrameTimes();
+      }
       const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 

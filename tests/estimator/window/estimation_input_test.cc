@@ -111,7 +111,13 @@ TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
 
   Recording reanchored = recording;
   reanchored.match_noise = MatchNoise::kSecondImage;
-  EXPECT_EQ(SelectPairs(reanchored).gap, 1);
+  const PairSelection chain = SelectPairs(reanchored);  // 301 frames are too few for 3
+  EXPECT_EQ(chain.gap, 2);
+  EXPECT_EQ(chain.stride, 2);
+  EXPECT_TRUE(chain.leaves_frames_out());
+  EXPECT_FALSE(selection.leaves_frames_out());
+  EXPECT_FALSE(SelectPairs(reanchored, /*longest_gap=*/1).leaves_frames_out());
+  EXPECT_EQ(SelectPairs(reanchored, /*longest_gap=*/10, /*least_pairs=*/50).gap, 3);  // 0.1 s
 
   // Too short for 100 pairs, or tracks too short: neighbours.
   EXPECT_EQ(SelectPairs(SimulateTracks(ShortScenario(3.0))->recording).gap, 1);
