@@ -6,6 +6,19 @@
 #include "core/state.h"
 
 namespace camgyro {
+namespace {
+
+// No lens has a focal length outside of these, in diagonals of its picture: a fisheye that sees 220
+// degrees along the diagonal has 0.26 of one, a 350 mm lens on 35 mm film 8.
+constexpr double kShortestFocal = 0.15, kLongestFocal = 8.0;
+
+bool FocalRanAway(bool attitudes, const Calibration& c) {
+  const double diagonal_px = std::hypot(c.width_px, c.height_px);
+  return !attitudes && !(c.lens[kFocal] > kShortestFocal * diagonal_px &&
+                         c.lens[kFocal] < kLongestFocal * diagonal_px);
+}
+
+}  // namespace
 
 void MarkDetermined(bool attitudes, const Prior& prior, Calibration* c) {
   StateScales scales;
@@ -18,6 +31,8 @@ void MarkDetermined(bool attitudes, const Prior& prior, Calibration* c) {
                                             sigma[i] < parameter.useful_sigma.In(scales) &&
                                             sigma[i] < 0.5 * prior.sigma[i];
   }
+  // What such a fit says of anything, the delay included, has no known error.
+  if (FocalRanAway(attitudes, *c)) c->determined.fill(false);
   // Rows are timed by the angles between them: without a focal length there are none.
   if (!c->determined[kStateFocal]) c->determined[kStateReadout] = false;
 }
@@ -28,6 +43,13 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
   const auto determined = [&](int i) { return c.determined[static_cast<size_t>(i)]; };
   if (!report->converged) {
     report->doubts.push_back("the refinement had not settled when it was stopped");
+  }
+  if (FocalRanAway(recording.HasOnlyAttitudes(), c)) {
+    report->doubts.push_back(Format(
+        "the focal length ran away, to %.3g px, which no lens has: nothing of this fit is to "
+        "be believed; by rotation alone, the start found a delay of %.1f ms in the middle "
+        "row",
+        c.lens[kFocal], 1e3 * report->start.delay_middle_row_s));
   }
   const double centre_off =
       std::hypot(c.lens[kCx] - 0.5 * c.width_px, c.lens[kCy] - 0.5 * c.height_px);
