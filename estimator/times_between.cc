@@ -13,13 +13,13 @@ std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Refi
                                           const PairLimits& limits) {
   // Of the calibration's sigmas: what is a frame's own moves nothing else.
   constexpr double kHeld = 1e-3;
-  // The noise and the spread are known; what is left are directions and times, for which two rounds
-  // of search and solve do, and which need no covariance of the calibration to settle.
+  // The calibration and the times of the frames in pairs are known; what is left are directions and
+  // times, for which two rounds of search and solve do.
   constexpr int kRounds = 2;
   const PairSelection selection = SelectPairs(recording);
   if (fit.frame_times.empty() || !selection.leaves_frames_out()) return fit.frame_times;
 
-  EstimationInput input = OutlineOf(recording, PairSelection());
+  const EstimationInput input = OutlineOf(recording, PairSelection());
   std::vector<TimedPair> pairs =
       InformativePairs(input, fit.calibration.delay_s, limits, options.graph);
   AddMatches(recording, &pairs);

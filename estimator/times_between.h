@@ -14,9 +14,8 @@ namespace camgyro {
 // Own times of all frames (frame_stamp_jitter), also of those that SelectPairs leaves out: found
 // from the pairs of neighbours, with lens, shutter, mounting and bias held where `fit` has them,
 // and its times as a start. Their sigmas are those of a frame's time beside a calibration that is
-// known. limits: of the pairs of neighbours. Those of the fit where it has no frame times, leaves
-// none out, or cannot be continued.
-// options: those of the fit.
+// known. options: those of the fit. limits: of the pairs of neighbours. Returns the times of the
+// fit where it has none, leaves no frame out, or the fit of the neighbours fails.
 std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Refined& fit,
                                           const RefinementOptions& options,
                                           const PairLimits& limits);

@@ -11,7 +11,7 @@
 namespace camgyro {
 
 PairSelection SelectPairs(const Recording& recording, int longest_gap, int least_pairs) {
-  // Of 10 frames per second and their multiples, with their stamps' rounding.
+  // A little more than 0.1 s, so that 3 frames of a camera of 29.95 Hz are not too long.
   constexpr double kLongestS = 0.2, kLongestReanchoredS = 0.101;
   PairSelection selection;
   if (!recording.matches.empty() || recording.tracks.empty()) return selection;

@@ -38,8 +38,8 @@ constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
 // Where a tracker re-anchors at every frame (MatchNoise::kSecondImage), the error of a gap is the
 // sum of those of its frames: it grows as the root of the gap, slower than what is to be seen, and
 // each frame's is in one pair if a pair begins where the one before has ended. The longest gap is
-// 0.1 s there: up to it, sigmas are those of neighbours, or smaller, in a half to two thirds of the
-// time, and beyond it they grow (docs/lab/pairs.md).
+// 0.1 s there: up to it, sigmas are about those of neighbours, in a half to two thirds of the time,
+// and beyond it they grow (docs/lab/pairs.md).
 PairSelection SelectPairs(const Recording& recording, int longest_gap = 10, int least_pairs = 100);
 
 // Pairs from matches, tracks (which of them: `selection`) or attitudes. Matches come in the pairs
