@@ -184,15 +184,39 @@ AddPairResult PairGraph::AddPair(const TimedPair& timed) {
   rates_.AddTo(cover, &graph_);
   if (facts.has_direction) AddDirection(timed.id, &pair);
   AddFrameTimes(timed, &pair);
-  std::shared_ptr<const ceres::CostFunction> cost = residual().MakeCost(pair.measurement, timed.id);
-  if (options_.remember_jacobians) {
-    pair.remembered = std::make_shared<RememberedCost>(std::move(cost));
-    cost = pair.remembered;
-  }
-  pair.factor = graph_.AddFactor(std::move(cost), BlocksOf(timed.id, pair));
+  MakeFactor(timed.id, &pair);
   pairs_.emplace(timed.id, std::move(pair));
   if (facts.has_direction) Residuals(timed.id, /*search=*/true);
   return AddPairResult::kAdded;
+}
+
+void PairGraph::MakeFactor(int64_t id, Pair* pair) {
+  std::shared_ptr<const ceres::CostFunction> cost = residual().MakeCost(pair->measurement, id);
+  if (options_.remember_jacobians) {
+    pair->remembered = std::make_shared<RememberedCost>(std::move(cost));
+    cost = pair->remembered;
+  }
+  pair->factor = graph_.AddFactor(std::move(cost), BlocksOf(id, *pair));
+}
+
+void PairGraph::LeaveOutTracks(const std::vector<int64_t>& track_ids) {
+  for (auto& [id, pair] : pairs_) {
+    auto kept = std::make_shared<PairMeasurement>(*pair.measurement);
+    std::vector<Match>& matches = kept->matches;
+    matches.erase(std::remove_if(matches.begin(), matches.end(),
+                                 [&](const Match& match) {
+                                   return std::binary_search(track_ids.begin(), track_ids.end(),
+                                                             match.track_id);
+                                 }),
+                  matches.end());
+    if (matches.size() == pair.measurement->matches.size() ||
+        static_cast<int>(matches.size()) < kMinMatches) {
+      continue;
+    }
+    graph_.RemoveFactor(pair.factor);
+    pair.measurement = std::move(kept);
+    MakeFactor(id, &pair);
+  }
 }
 
 bool PairGraph::KeepMatches(const RateGroups::Cover& cover, PairMeasurement* pair) const {

@@ -22,6 +22,7 @@
 #include "estimator/window/rate_groups.h"
 #include "estimator/window/remembered_cost.h"
 #include "estimator/window/timed_pair.h"
+#include "estimator/window/track_lean.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/pair_bearings.h"
 
@@ -94,6 +95,11 @@ class PairGraph {
   std::vector<double> Residuals(int64_t id, bool search) {
     return Residuals(id, search, &bearings_);
   }
+  // Without a search; adds how far each match is to one side of its plane, where pairs have a
+  // direction.
+  std::vector<double> ResidualsWithLeans(int64_t id, TrackLeans* leans);
+  // Takes the matches of these tracks (ascending ids) out of the pairs, where kMinMatches are left.
+  void LeaveOutTracks(const std::vector<int64_t>& track_ids);
   // Of all pairs, in the order of pair_ids.
   std::vector<std::vector<double>> AllResiduals(bool search);
   // The same residuals under the pair's own direction, and each under the direction that fits the
@@ -156,6 +162,10 @@ class PairGraph {
   };
 
   const PairResidual& residual() const { return *options_.residual; }
+  // The pair's factor, new or in place of the one before.
+  void MakeFactor(int64_t id, Pair* pair);
+  // A pair with these bearings, at the present estimate; a copy.
+  PairView ViewOf(const Pair& pair, const PairBearings& bearings) const;
   // Beside each other for different pairs, with bearings of their own to work in.
   std::vector<double> Residuals(int64_t id, bool search, PairBearings* bearings);
   CrossFit CrossFitOf(int64_t id, PairBearings* bearings);

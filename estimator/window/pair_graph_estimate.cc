@@ -36,6 +36,25 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search, PairBearings* 
   return std::move(found.residuals);
 }
 
+PairView PairGraph::ViewOf(const Pair& pair, const PairBearings& bearings) const {
+  PairView view;
+  view.measurement = *pair.measurement;
+  view.bearings = bearings;
+  view.bend_sigma_rad = pair.bend_sigma_rad;
+  return view;
+}
+
+std::vector<double> PairGraph::ResidualsWithLeans(int64_t id, TrackLeans* leans) {
+  std::vector<double> residuals = Residuals(id, /*search=*/false);
+  if (residuals.empty() || !residual().facts().has_direction) return residuals;
+  const PairView view = ViewOf(pairs_.at(id), bearings_);
+  const PairPlane plane{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    leans->Add(view.measurement.matches[i].track_id, residuals[i], CorrectionOf(view, plane, i));
+  }
+  return residuals;
+}
+
 CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
   CrossFit fit;
   if (!residual().facts().has_direction) return fit;
@@ -43,10 +62,7 @@ CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
       Residuals(id, /*search=*/false, bearings);  // fills the bearings, too
   if (own.size() < 2 * kMinMatches) return fit;
   const Pair& pair = pairs_.at(id);
-  PairView view;
-  view.measurement = *pair.measurement;
-  view.bearings = *bearings;
-  view.bend_sigma_rad = pair.bend_sigma_rad;
+  const PairView view = ViewOf(pair, *bearings);
   const auto bounded_sq = [&](double r) {
     return std::pow(Robustify(r, options_.robust_threshold).value, 2);
   };

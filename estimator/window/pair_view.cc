@@ -65,6 +65,16 @@ PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i)
                                plane.DirectionOf(m, i), m.variance_a(), m.variance_b());
 }
 
+Eigen::Vector2d CorrectionOf(const PairView& view, const PairPlane& plane, size_t i) {
+  const Bearing &a = view.bearings.a[i], &b = view.bearings.b[i];
+  const Eigen::Vector3d tau = plane.DirectionOf(view.measurement, i);
+  // tau . (a x b) = (tau x a) . b moves with px_b, in units of its noise, as this gradient says.
+  const Eigen::Vector2d gradient = b.J_ray_px.transpose() * tau.cross(a.ray_ref);
+  if (!(gradient.squaredNorm() > 0.0)) return Eigen::Vector2d::Zero();
+  return -tau.dot(a.ray_ref.cross(b.ray_ref)) / gradient.squaredNorm() *
+         (b.noise_factor * gradient);
+}
+
 namespace {
 
 // Normal equations of some matches, about a plane: two coordinates of the direction, then the bend.

@@ -57,6 +57,9 @@ double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t fir
 // Of match i, in sigmas, without loss.
 PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i);
 
+// The shortest shift of px_b that takes match i onto the plane; see MatchMisfit.
+Eigen::Vector2d CorrectionOf(const PairView& view, const PairPlane& plane, size_t i);
+
 // The samples that a pair needs, and one beyond on both sides; false where there are none, one is
 // saturated, or two of them are further apart than 30 ms and than five mean intervals.
 [[nodiscard]] bool RatesOfPair(const EstimationInput& input, const TimedPair& pair,

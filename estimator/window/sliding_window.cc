@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -72,6 +73,7 @@ void SlidingWindow::ProcessPending() {
   while (!pending_.empty()) {
     Pending& next = pending_.front();
     next.pair.id = next_pair_id_;
+    LeaveOutMoving(&next.pair);
     const AddPairResult added = graph_.AddPair(next.pair);
     if (added == AddPairResult::kGyroTooLate) return;
     if (added == AddPairResult::kAdded) {
@@ -85,6 +87,35 @@ void SlidingWindow::ProcessPending() {
     graph_.ForgetOldRates(next.pair.time_a_s + DelayOf(latest_.estimate, next.pair.first()) - 1.0);
     pending_.pop_front();
   }
+}
+
+void SlidingWindow::LeaveOutMoving(TimedPair* pair) {
+  if (moving_.empty()) return;
+  const auto moves = [&](const Match& match) {
+    const auto track = moving_.find(match.track_id);
+    if (track == moving_.end()) return false;
+    track->second = pair->id;
+    return true;
+  };
+  pair->matches.erase(std::remove_if(pair->matches.begin(), pair->matches.end(), moves),
+                      pair->matches.end());
+  // Tracks that are gone do not come back.
+  for (auto track = moving_.begin(); track != moving_.end();) {
+    const bool gone = pair->id - track->second > options_.unsettled_pairs;
+    track = gone ? moving_.erase(track) : std::next(track);
+  }
+}
+
+void SlidingWindow::FindMoving() {
+  TrackLeans here;
+  for (const auto& entry : leans_) here.Add(entry.second);
+  leans_before_.KeepOnly(here);
+  TrackLeans all = leans_before_;
+  all.Add(here);
+  const std::vector<int64_t> moving = MovingTracks(all.All());
+  if (moving.empty()) return;
+  graph_.LeaveOutTracks(moving);
+  for (const int64_t track_id : moving) moving_[track_id] = next_pair_id_;
 }
 
 void SlidingWindow::Process(const Pending& pair) {
@@ -114,6 +145,7 @@ void SlidingWindow::Process(const Pending& pair) {
   }
   latest_ = std::move(update);
   if (listener_) listener_(latest_);
+  if (options_.graph.robust_threshold > 0.0) FindMoving();
 
   const int keep =
       settled_ ? options_.window_pairs : options_.unsettled_pairs - options_.undetermined_stride;
@@ -123,6 +155,8 @@ void SlidingWindow::Process(const Pending& pair) {
       failure_ = left.error().message;
       return;  // the next window tries again
     }
+    leans_before_.Add(leans_.begin()->second);
+    leans_.erase(leans_.begin());
   }
 }
 
@@ -159,7 +193,10 @@ Status SlidingWindow::SolveWindow(const TimedPair& newest, WindowUpdate* update)
 void SlidingWindow::UpdateNoise() {
   std::vector<std::vector<double>> residuals;
   const std::vector<int64_t> ids = graph_.pair_ids();
-  for (const int64_t id : ids) residuals.push_back(graph_.Residuals(id, /*search=*/false));
+  for (const int64_t id : ids) {
+    leans_[id] = {};
+    residuals.push_back(graph_.ResidualsWithLeans(id, &leans_[id]));
+  }
   const double here_px = noise_of_pairs_px_ * noise_scale_.Growth(residuals, noise_of_pairs_px_);
   // A settled window holds few pairs: its scale is averaged over time.
   noise_px_ *= settled_ ? std::pow(here_px / noise_px_, 0.1) : here_px / noise_px_;

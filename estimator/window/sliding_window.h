@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <limits>
+#include <map>
 #include <string>
 
 #include "core/calibration.h"
@@ -13,6 +14,7 @@
 #include "core/result.h"
 #include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
+#include "estimator/window/track_lean.h"
 
 namespace camgyro {
 
@@ -99,6 +101,10 @@ class SlidingWindow {
   static constexpr size_t kMaxPending = 300;  // pairs that wait for the gyro; then the oldest goes
 
   void ProcessPending();
+  // The pair without what is known to move.
+  void LeaveOutMoving(TimedPair* pair);
+  // Looks for tracks that move among those of the window, and takes them out of it.
+  void FindMoving();
   void Process(const Pending& pair);
   // Column of the skew among the effects; -1: the clocks' rates do not walk.
   int WalkingSkew() const;
@@ -123,6 +129,11 @@ class SlidingWindow {
   CrossFit cross_fit_;
   bool settled_ = false;
   FrameOffset newest_frame_;  // if frames have times of their own
+  // How far tracks lean in each pair of the window, as the latest estimate has it, and in those
+  // that have left it; of tracks that are still in it.
+  std::map<int64_t, TrackLeans> leans_;
+  TrackLeans leans_before_;
+  std::map<int64_t, int64_t> moving_;  // tracks that move, and the last pair that had them
   std::string failure_;
 };
 

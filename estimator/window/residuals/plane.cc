@@ -54,19 +54,11 @@ class Plane final : public PairResidual {
     if (!FitPair(input, pair, calibration, noise, options, view, &plane)) return false;
     misfits->clear();
     for (size_t i = 0; i < view->bearings.a.size(); ++i) {
-      const Bearing &a = view->bearings.a[i], &b = view->bearings.b[i];
       const double sigmas = ResidualOf(*view, plane, i).value;
-      const Eigen::Vector3d tau = plane.DirectionOf(view->measurement, i);
       MatchMisfit misfit;
       misfit.residual_px = sigmas * noise;
       misfit.inlier = std::abs(sigmas) <= options.inlier_sigmas();
-      // tau . (a x b) = (tau x a) . b moves with px_b, in units of its noise, as this gradient
-      // says.
-      const Eigen::Vector2d gradient = b.J_ray_px.transpose() * tau.cross(a.ray_ref);
-      if (gradient.squaredNorm() > 0.0) {
-        misfit.correction_px = -tau.dot(a.ray_ref.cross(b.ray_ref)) / gradient.squaredNorm() *
-                               (b.noise_factor * gradient);
-      }
+      misfit.correction_px = CorrectionOf(*view, plane, i);
       misfits->push_back(misfit);
     }
     return true;
