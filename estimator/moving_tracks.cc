@@ -55,13 +55,7 @@ std::vector<TrackLean> LeanOfTracks(const EstimationInput& input,
 std::vector<TimedPair> WithoutTracks(const std::vector<TimedPair>& pairs,
                                      const std::vector<int64_t>& track_ids) {
   std::vector<TimedPair> kept = pairs;
-  for (TimedPair& pair : kept) {
-    const auto left_out = [&](const Match& match) {
-      return std::binary_search(track_ids.begin(), track_ids.end(), match.track_id);
-    };
-    pair.matches.erase(std::remove_if(pair.matches.begin(), pair.matches.end(), left_out),
-                       pair.matches.end());
-  }
+  for (TimedPair& pair : kept) EraseMatchesOf(track_ids, &pair.matches);
   return kept;
 }
 

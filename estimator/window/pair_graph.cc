@@ -202,15 +202,9 @@ void PairGraph::MakeFactor(int64_t id, Pair* pair) {
 void PairGraph::LeaveOutTracks(const std::vector<int64_t>& track_ids) {
   for (auto& [id, pair] : pairs_) {
     auto kept = std::make_shared<PairMeasurement>(*pair.measurement);
-    std::vector<Match>& matches = kept->matches;
-    matches.erase(std::remove_if(matches.begin(), matches.end(),
-                                 [&](const Match& match) {
-                                   return std::binary_search(track_ids.begin(), track_ids.end(),
-                                                             match.track_id);
-                                 }),
-                  matches.end());
-    if (matches.size() == pair.measurement->matches.size() ||
-        static_cast<int>(matches.size()) < kMinMatches) {
+    EraseMatchesOf(track_ids, &kept->matches);
+    if (kept->matches.size() == pair.measurement->matches.size() ||
+        static_cast<int>(kept->matches.size()) < kMinMatches) {
       continue;
     }
     graph_.RemoveFactor(pair.factor);

@@ -91,14 +91,15 @@ void SlidingWindow::ProcessPending() {
 
 void SlidingWindow::LeaveOutMoving(TimedPair* pair) {
   if (moving_.empty()) return;
-  const auto moves = [&](const Match& match) {
+  std::vector<int64_t> here;
+  for (const Match& match : pair->matches) {
     const auto track = moving_.find(match.track_id);
-    if (track == moving_.end()) return false;
+    if (track == moving_.end()) continue;
     track->second = pair->id;
-    return true;
-  };
-  pair->matches.erase(std::remove_if(pair->matches.begin(), pair->matches.end(), moves),
-                      pair->matches.end());
+    here.push_back(match.track_id);
+  }
+  std::sort(here.begin(), here.end());
+  EraseMatchesOf(here, &pair->matches);
   // Tracks that are gone do not come back.
   for (auto track = moving_.begin(); track != moving_.end();) {
     const bool gone = pair->id - track->second > options_.unsettled_pairs;
@@ -115,7 +116,9 @@ void SlidingWindow::FindMoving() {
   const std::vector<int64_t> moving = MovingTracks(all.All());
   if (moving.empty()) return;
   graph_.LeaveOutTracks(moving);
-  for (const int64_t track_id : moving) moving_[track_id] = next_pair_id_;
+  for (const int64_t track_id : moving) {
+    num_moving_ += moving_.insert_or_assign(track_id, next_pair_id_).second;
+  }
 }
 
 void SlidingWindow::Process(const Pending& pair) {

@@ -86,6 +86,8 @@ class SlidingWindow {
   const WindowUpdate& latest() const { return latest_; }
   int num_used_pairs() const { return num_used_; }
   int num_skipped_pairs() const { return num_skipped_; }
+  // Tracks of things that move by themselves (track_lean.h), left out from when that was seen.
+  int num_moving_tracks() const { return num_moving_; }
   // Windows without a result: the last good estimate stands.
   int num_failed_solves() const { return num_failed_solves_; }
   // Why the latest one has none; empty if it has.
@@ -123,7 +125,7 @@ class SlidingWindow {
   double last_gyro_time_s_ = -std::numeric_limits<double>::infinity();
   double last_pair_time_s_ = -std::numeric_limits<double>::infinity();
   int64_t next_pair_id_ = 0;
-  int num_used_ = 0, num_skipped_ = 0, num_failed_solves_ = 0;
+  int num_used_ = 0, num_skipped_ = 0, num_failed_solves_ = 0, num_moving_ = 0;
   const NoiseScale noise_scale_;
   double noise_px_ = 1.0, noise_of_pairs_px_ = 1.0;
   CrossFit cross_fit_;

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "core/recording.h"
-
 namespace camgyro {
 namespace {
 
@@ -82,6 +80,13 @@ std::vector<int64_t> MovingTracks(const std::vector<TrackLean>& leans) {
     if (lean.chi2 >= least) moving.push_back(lean.track_id);
   }
   return moving;
+}
+
+void EraseMatchesOf(const std::vector<int64_t>& track_ids, std::vector<Match>* matches) {
+  const auto is_of_them = [&](const Match& match) {
+    return std::binary_search(track_ids.begin(), track_ids.end(), match.track_id);
+  };
+  matches->erase(std::remove_if(matches->begin(), matches->end(), is_of_them), matches->end());
 }
 
 }  // namespace camgyro

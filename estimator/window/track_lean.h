@@ -7,6 +7,8 @@
 #include <map>
 #include <vector>
 
+#include "core/recording.h"
+
 namespace camgyro {
 
 // Noise falls on either side of the epipolar line in each pair of frames anew; what moves goes on
@@ -60,6 +62,9 @@ class TrackLeans {
 constexpr double kFalseDiscoveries = 0.05;
 constexpr double kMostMoving = 0.5;
 std::vector<int64_t> MovingTracks(const std::vector<TrackLean>& leans);
+
+// Takes out the matches of these tracks (ascending ids).
+void EraseMatchesOf(const std::vector<int64_t>& track_ids, std::vector<Match>* matches);
 
 }  // namespace camgyro
 

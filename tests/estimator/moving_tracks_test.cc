@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <set>
 
 #include "tests/estimator/simulated_input.h"
@@ -12,7 +11,6 @@
 namespace camgyro {
 namespace {
 
-using testing::ElementsAre;
 using testing::IsEmpty;
 
 struct WalkScene {
@@ -81,21 +79,6 @@ TEST(MovingTracks, AreThoseThatMove) {
         return scene.moving.count(lean.track_id) > 0;
       }));
   EXPECT_GT(right, 0.6 * moves);  // the others go along their epipolar lines
-}
-
-TEST(MovingTracks, AreNotWhatTheModelMakesOfAll) {
-  std::mt19937 generator(2);
-  std::exponential_distribution<double> half_chi2(1.0);
-  std::vector<TrackLean> leans;
-  for (int i = 0; i < 1000; ++i) leans.push_back({i, 20, 2.0 * half_chi2(generator)});
-  EXPECT_THAT(MovingTracks(leans), IsEmpty());
-  for (TrackLean& lean : leans) lean.chi2 *= 6.0;  // all of them, as of an undeclared effect
-  EXPECT_THAT(MovingTracks(leans), IsEmpty());
-  leans[17].chi2 = leans[400].chi2 = 300.0;
-  EXPECT_THAT(MovingTracks(leans), ElementsAre(17, 400));
-  for (size_t i = 0; i < 600; ++i) leans[i].chi2 = 1e4;
-  EXPECT_THAT(MovingTracks(leans), IsEmpty());
-  EXPECT_THAT(MovingTracks({}), IsEmpty());
 }
 
 TEST(FitWhatIsStill, FitsAgainWithoutWhatMoves) {

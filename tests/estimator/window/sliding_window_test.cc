@@ -60,6 +60,31 @@ TEST(SlidingWindow, FindsTheTruthWithinItsSigmasAndAgreesWithTheRefinement) {
   EXPECT_LT(gap.cwiseAbs().maxCoeff(), 3.0) << gap.transpose();
 }
 
+// A third of the points moves by itself. Found in the window of the present, they leave it, and do
+// not come back; of a scene at rest, hardly any does.
+TEST(SlidingWindow, LeavesOutTracksThatMove) {
+  for (const double moving : {0.0, 0.3}) {
+    SCOPED_TRACE(moving);
+    Scenario scenario = ShortScenario(10.0);
+    scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+    scenario.scene.moving_fraction = moving;
+    scenario.tracks.count = 100;
+    scenario.tracks.noise_px = 0.5;
+    const Simulated s = SimulateTracks(scenario).value();
+    SlidingWindow window = MakeWindow(s);
+    FeedAll(s.recording, &window);
+    EXPECT_EQ(window.num_failed_solves(), 0);
+    EXPECT_NEAR(window.latest().noise_px, 0.5, 0.05);
+    const StateVector error = ErrorInSigmas(window.latest().estimate, s.truth);
+    EXPECT_LT(error.cwiseAbs().maxCoeff(), 4.0) << error.transpose();
+    if (moving > 0.0) {
+      EXPECT_GT(window.num_moving_tracks(), 40);
+    } else {
+      EXPECT_LE(window.num_moving_tracks(), 2);
+    }
+  }
+}
+
 // Exact pixels of a camera that rests have no noise at all: the window believes no less of them
 // than the refinement does.
 TEST(SlidingWindow, NoiseHasALeastValue) {
