@@ -87,7 +87,8 @@ struct Snapshot {
   // the standard deviation of that over the frames. Else 0.
   double frame_offset_s = 0.0, frame_offset_sigma_s = 0.0, frame_jitter_s = 0.0;
   double noise_px = 0.0;             // of a match, per axis
-  std::uint64_t frames = 0;          // processed by the worker
+  double wrong_ratio = 0.0;          // share of the points of AddTracks that left their track
+  std::uint64_t frames = 0;          // taken by the worker
   std::uint64_t frames_dropped = 0;  // answered with kQueueFull
   std::uint64_t pairs_used = 0, pairs_skipped = 0;
   int starts = 0;  // searches for a start so far; more than one after a refusal or a restart
@@ -110,8 +111,10 @@ class Calibrator {
   // The stamp of the first row, camera clock. Either images or tracks; the first call decides, and
   // the other is then kOutOfRange.
   CAMGYRO_API AddResult AddImage(std::int64_t stamp_ns, const ImageView& image) noexcept;
-  // In any order of ids. kOutOfRange: an id twice, a point further outside of the picture than its
-  // size, more than 5000 points.
+  // In any order of ids, which are 0 or more. kOutOfRange: an id twice, a point further outside of
+  // the picture than its size, more than 5000 points. A frame reaches the estimate when three more
+  // have come: what jumps off its track and back is left out; a track that slips to another corner
+  // goes on under a negative id.
   CAMGYRO_API AddResult AddTracks(std::int64_t stamp_ns, const TrackPoint* points,
                                   std::size_t count) noexcept;
 

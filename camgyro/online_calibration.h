@@ -51,6 +51,7 @@ class OnlineCalibration {
 
   void AddGyro(const GyroSample& sample);
   void AddFrame(OnlineFrame frame);
+  const Progress& progress() const { return progress_; }
 
  private:
   void Collect();

@@ -198,13 +198,25 @@ void Calibrator::Worker::Process(const std::vector<GyroSample>& recorded, FrameI
     }
   }
   if (frame == nullptr) return;
-  std::vector<TrackedPoint> points = std::move(frame->points);
-  if (!frame->image.empty()) points = cleaner_.Add(tracker_.Add(frame->image));
+  std::optional<OnlineFrame> known = WithoutWrongPoints(frame);
+  if (!known) return Publish(online_->progress());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    recent_.Add({frame->stamp_ns, points});
+    recent_.Add(*known);
   }
-  online_->AddFrame({frame->stamp_ns, std::move(points)});
+  online_->AddFrame(*std::move(known));
+}
+
+std::optional<OnlineFrame> Calibrator::Worker::WithoutWrongPoints(FrameIn* frame) {
+  if (!frame->image.empty()) {
+    return OnlineFrame{frame->stamp_ns, cleaner_.Add(tracker_.Add(frame->image))};
+  }
+  held_stamps_ns_.push_back(frame->stamp_ns);
+  std::optional<std::vector<TrackedPoint>> points = jumps_.Add(std::move(frame->points));
+  if (!points) return std::nullopt;
+  const std::int64_t stamp_ns = held_stamps_ns_.front();
+  held_stamps_ns_.pop_front();
+  return OnlineFrame{stamp_ns, *std::move(points)};
 }
 
 // Not before it can make the estimate ready: at a poor estimate, derivatives say little.
@@ -228,6 +240,8 @@ void Calibrator::Worker::Publish(const OnlineCalibration::Progress& of_noise) {
   total_.AddTo(&progress);
   auto next = std::make_shared<Snapshot>(MakeSnapshot(progress, options_));
   next->doubt = total_.doubt();
+  next->frames += held_stamps_ns_.size();
+  next->wrong_ratio = jumps_.jumps().wrong_ratio();
   if (clock_.report()) next->gyro_stamps = DescribeStamps(*clock_.report());
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -23,6 +23,7 @@
 #include "core/recording.h"
 #include "frontend/streaming_clock.h"
 #include "frontend/track_cleaner.h"
+#include "frontend/track_jumps.h"
 #include "frontend/tracker.h"
 
 namespace camgyro::api {
@@ -57,6 +58,10 @@ class Calibrator::Worker {
   void TakeAndProcess(std::unique_lock<std::mutex>* lock);
   std::vector<GyroSample> TakeGyro(const std::vector<GyroSample>& recorded);
   void Process(const std::vector<GyroSample>& recorded, FrameIn* frame, MatchNoise noise);
+  // The frame that goes to the estimate when this one has come, without wrong points: itself, if it
+  // is a picture; of given tracks, one that came StreamingTrackJumps::kBehind before; none at
+  // first.
+  std::optional<OnlineFrame> WithoutWrongPoints(FrameIn* frame);
   void RenewTotal(const OnlineCalibration::Progress& progress);
   void Publish(const OnlineCalibration::Progress& of_noise);
   void Stop(const std::string& message) noexcept;
@@ -80,7 +85,9 @@ class Calibrator::Worker {
 
   // The worker's own.
   KltTracker tracker_;
-  TrackCleaner cleaner_;
+  TrackCleaner cleaner_;                     // of pictures
+  StreamingTrackJumps jumps_;                // of given tracks
+  std::deque<std::int64_t> held_stamps_ns_;  // of the frames that it holds
   StreamingClock clock_;
   std::optional<OnlineCalibration> online_;
   TotalError total_;

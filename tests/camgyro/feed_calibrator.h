@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -76,6 +77,10 @@ inline void Feed(Calibrator* c, const Recording& r) {
     ASSERT_EQ(Add(c, r, i), AddResult::kAccepted);
   }
   until(std::numeric_limits<int64_t>::max());
+}
+
+inline double Sigmas(double estimate, double truth, const ParameterState& p) {
+  return std::abs(estimate - truth) / p.sigma;
 }
 
 }  // namespace camgyro::api

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
 #include <set>
 #include <string>
 #include <utility>
@@ -133,6 +135,94 @@ TEST(TrackJumps, FewTracksAndNoneStay) {
   const TrackJumps jumps = RemoveTrackJumps(&recording);
   EXPECT_EQ(jumps.points, 12u);
   EXPECT_EQ(jumps.off + jumps.cuts, 0u);
+}
+
+// Every seventh picture is the one before: nothing moves, then everything moves twice as far.
+TEST(TrackJumps, ARepeatedPictureIsNoJump) {
+  simulation::Simulated simulated = WalkWithTracks("running");
+  std::vector<std::vector<TrackedPoint>>& tracks = simulated.recording.tracks;
+  for (size_t f = 7; f < tracks.size(); f += 7) tracks[f] = tracks[f - 1];
+  const TrackJumps jumps = RemoveTrackJumps(&simulated.recording);
+  EXPECT_LT(jumps.wrong_ratio(), 5e-3);
+}
+
+struct Streamed {
+  Recording recording;  // with what came out, in place
+  TrackJumps jumps;
+};
+
+Streamed ThroughStream(const Recording& recording) {
+  Streamed streamed;
+  StreamingTrackJumps stream;
+  for (const auto& points : recording.tracks) {
+    const size_t before = stream.held();
+    auto known = stream.Add(points);
+    EXPECT_EQ(known.has_value(), before == StreamingTrackJumps::kBehind);
+    if (known) streamed.recording.tracks.push_back(*std::move(known));
+  }
+  EXPECT_EQ(streamed.recording.tracks.size() + stream.held(), recording.tracks.size());
+  streamed.jumps = stream.jumps();
+  return streamed;
+}
+
+// The rule is that of the whole recording, with the noise of a second instead of all of it.
+TEST(StreamingTrackJumps, LeavesOutWhatTheWholeRecordingDoes) {
+  for (const double fraction : {0.0, 0.15}) {
+    SCOPED_TRACE(fraction);
+    simulation::Simulated simulated = WalkWithTracks("walking", fraction);
+    const Streamed streamed = ThroughStream(simulated.recording);
+    RemoveTrackJumps(&simulated.recording);
+    simulated.recording.tracks.resize(streamed.recording.tracks.size());
+    const auto whole = PointsOf(simulated.recording), parts = PointsOf(streamed.recording);
+    std::vector<std::pair<size_t, double>> differ;
+    std::set_symmetric_difference(whole.begin(), whole.end(), parts.begin(), parts.end(),
+                                  std::back_inserter(differ));
+    EXPECT_LT(static_cast<double>(differ.size()), 0.01 * static_cast<double>(whole.size()));
+    for (const auto& frame : streamed.recording.tracks) {
+      for (size_t i = 1; i < frame.size(); ++i) ASSERT_LT(frame[i - 1].track_id, frame[i].track_id);
+    }
+    EXPECT_NEAR(streamed.jumps.wrong_ratio(), fraction, fraction > 0.0 ? 0.03 : 3e-3);
+  }
+}
+
+TEST(StreamingTrackJumps, ATrackThatSlipsGoesOnAsAnother) {
+  simulation::Simulated simulated = WalkWithTracks("walking");
+  std::vector<std::vector<TrackedPoint>>& tracks = simulated.recording.tracks;
+  std::set<int64_t> slips;  // of those that frames 98 to 101 see, every tenth
+  for (const TrackedPoint& point : tracks[98]) {
+    if (point.track_id % 10 == 0) slips.insert(point.track_id);
+  }
+  for (const size_t f : {size_t{99}, size_t{100}, size_t{101}}) {
+    std::set<int64_t> here;
+    for (const TrackedPoint& point : tracks[f]) {
+      if (slips.count(point.track_id) > 0) here.insert(point.track_id);
+    }
+    slips = std::move(here);
+  }
+  ASSERT_GE(slips.size(), 3u);
+  for (size_t f = 100; f < tracks.size(); ++f) {
+    for (TrackedPoint& point : tracks[f]) {
+      if (slips.count(point.track_id) > 0) point.px += Eigen::Vector2d(12.0, -9.0);
+    }
+  }
+  const Streamed streamed = ThroughStream(simulated.recording);
+  EXPECT_GE(streamed.jumps.cuts, slips.size());
+  for (size_t f = 0; f < streamed.recording.tracks.size(); ++f) {
+    std::set<int64_t> cut;
+    for (const TrackedPoint& point : streamed.recording.tracks[f]) {
+      if (f >= 100) {
+        EXPECT_EQ(slips.count(point.track_id), 0u) << f;
+      }
+      if (point.track_id <= StreamingTrackJumps::kLargestCutId) cut.insert(point.track_id);
+    }
+    // They go on: as many as are there. Before, only points at arm's length are cut.
+    if (f == 100) {
+      EXPECT_GE(cut.size(), slips.size());
+    }
+    if (f < 100) {
+      EXPECT_LE(cut.size(), 3u) << f;
+    }
+  }
 }
 
 }  // namespace
