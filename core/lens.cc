@@ -81,15 +81,16 @@ class AxialLens final : public Lens {
     if (!has_distortion && by_lens <= LensDerivatives::kPinhole) {
       return UnprojectPinhole(distorted, fx, f, by_lens, out);
     }
+    const bool by_angle = equidistant_ || !lens.tail<4>().isZero(0.0);
     Eigen::Vector2d xy = distorted;
-    Distortion d = Distort(xy, lens);
+    Distortion d = Distort(xy, lens, by_angle);
     if (has_distortion) {
       for (int i = 0; i < 20; ++i) {
         const Eigen::Vector2d error = distorted - d.value;
         if (error.squaredNorm() < 1e-26) break;
         if (!IsInvertible(d, xy)) return false;
         xy += d.J.inverse() * error;
-        d = Distort(xy, lens);
+        d = Distort(xy, lens, by_angle);
       }
       if (!((distorted - d.value).squaredNorm() < 1e-20) || !IsInvertible(d, xy)) return false;
     }
@@ -107,7 +108,7 @@ class AxialLens final : public Lens {
                                          const LensParameters& lens) const override {
     if (!(point_cam.z() > 0.0)) return std::nullopt;
     const Eigen::Vector2d xy = point_cam.head<2>() / point_cam.z();
-    const Distortion d = Distort(xy, lens);
+    const Distortion d = Distort(xy, lens, equidistant_ || !lens.tail<4>().isZero(0.0));
     if (!IsInvertible(d, xy)) return std::nullopt;
     return Eigen::Vector2d(lens[kFocal] * lens[kAspect] * d.value.x() + lens[kCx],
                            lens[kFocal] * d.value.y() + lens[kCy]);
@@ -208,12 +209,13 @@ class AxialLens final : public Lens {
     }
   }
 
-  Distortion Distort(const Eigen::Vector2d& xy, const LensParameters& lens) const {
+  // by_angle: the lens has terms of the angle, whose series takes longest.
+  Distortion Distort(const Eigen::Vector2d& xy, const LensParameters& lens, bool by_angle) const {
     const double k1 = lens[kK1], k2 = lens[kK2], p1 = lens[kP1], p2 = lens[kP2];
     const double x = xy.x(), y = xy.y(), r2 = xy.squaredNorm();
     Distortion d;
     d.radial = {(k1 + k2 * r2) * r2, k1 + 2.0 * k2 * r2, 2.0 * k2};
-    if (equidistant_ || !lens.tail<4>().isZero(0.0)) {
+    if (by_angle) {
       const Radial c = AngleOverRadius(r2);
       const std::array<Radial, 4> series = AngleSeries(c, r2);
       for (int k = 0; k < 4; ++k) {

@@ -1,28 +1,41 @@
 #include "core/rotation_chain.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "core/so3.h"
 
 namespace camgyro {
 
 RotationChain::RotationChain(const std::vector<double>& times_s,
-                             const Eigen::Matrix3Xd& omega_gyro_rad_s)
-    : times_s_(times_s), omega_(omega_gyro_rad_s) {
+                             const Eigen::Matrix3Xd& omega_gyro_rad_s,
+                             const std::vector<int>& value_of)
+    : times_s_(times_s), omega_(omega_gyro_rad_s), value_of_(value_of) {
   const size_t n = times_s_.size();
+  if (value_of_.empty()) {
+    value_of_.resize(n);
+    std::iota(value_of_.begin(), value_of_.end(), 0);
+  }
   prefix_.resize(n);
-  before_.setZero(3 * static_cast<Eigen::Index>(n), 3);
-  around_.setZero(3 * static_cast<Eigen::Index>(n), 3);
+  until_.resize(3 * static_cast<Eigen::Index>(n), 3);
+  whole_.resize(3 * static_cast<Eigen::Index>(num_values()), 3);
   prefix_[0].setIdentity();
-  for (size_t j = 0; j + 1 < n; ++j) {
-    const double dt = times_s_[j + 1] - times_s_[j];
+  // By the rate of sample j, through the segment before it; by its value, through all before that.
+  Eigen::Matrix3d before = Eigen::Matrix3d::Zero(), earlier = Eigen::Matrix3d::Zero();
+  for (size_t j = 0; j < n; ++j) {
     const auto col = static_cast<Eigen::Index>(j);
-    const Eigen::Vector3d theta = 0.5 * dt * (omega_.col(col) + omega_.col(col + 1));
-    const Eigen::Matrix3d J_phi_theta = prefix_[j] * LeftJacobian(theta);
-    prefix_[j + 1] = prefix_[j] + J_phi_theta * Hat(theta);  // Exp(theta) = I + J_l(theta) theta^
-    const Eigen::Matrix3d segment = 0.5 * dt * J_phi_theta.transpose();
-    before_.middleRows<3>(3 * col + 3) = segment;
-    around_.middleRows<3>(3 * col) = before_.middleRows<3>(3 * col) + segment;
+    if (j > 0 && value_of_[j] != value_of_[j - 1]) earlier.setZero();
+    until_.middleRows<3>(3 * col) = earlier + before;
+    earlier += before;
+    if (j + 1 < n) {
+      const double dt = times_s_[j + 1] - times_s_[j];
+      const Eigen::Vector3d theta = 0.5 * dt * (omega_.col(col) + omega_.col(col + 1));
+      const Eigen::Matrix3d J_phi_theta = prefix_[j] * LeftJacobian(theta);
+      prefix_[j + 1] = prefix_[j] + J_phi_theta * Hat(theta);  // Exp(theta) = I + J_l(theta) theta^
+      before = 0.5 * dt * J_phi_theta.transpose();
+      earlier += before;
+    }
+    whole_.middleRows<3>(3 * value_of_[j]) = earlier;
   }
 }
 
@@ -65,12 +78,15 @@ void RotationChain::AddRateGradient(const State& state, const Eigen::Vector3d& b
   const int m = state.segment;
   // Whole segments before the one of `state`; past the last sample, the last one is whole too.
   const int whole = (state.weight_next == 1.0 && state.theta_this_s == 0.0) ? m + 1 : m;
-  Eigen::Map<Eigen::VectorXd>(gradient.data(), 3 * whole) +=
-      around_.topRows(3 * whole).lazyProduct(by_phi);
-  gradient.col(whole) += before_.middleRows<3>(3 * whole) * by_phi;
+  const int value = value_of_[static_cast<size_t>(whole)];
+  Eigen::Map<Eigen::VectorXd>(gradient.data(), 3 * value) +=
+      whole_.topRows(3 * value).lazyProduct(by_phi);
+  gradient.col(value) += until_.middleRows<3>(3 * whole) * by_phi;
   const Eigen::Vector3d by_theta = state.J_phi_theta.transpose() * by_phi;
-  gradient.col(m) += state.theta_this_s * by_theta + (1.0 - state.weight_next) * by_omega;
-  gradient.col(m + 1) += state.theta_next_s * by_theta + state.weight_next * by_omega;
+  gradient.col(value_of_[static_cast<size_t>(m)]) +=
+      state.theta_this_s * by_theta + (1.0 - state.weight_next) * by_omega;
+  gradient.col(value_of_[static_cast<size_t>(m) + 1]) +=
+      state.theta_next_s * by_theta + state.weight_next * by_omega;
 }
 
 }  // namespace camgyro

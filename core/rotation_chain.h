@@ -46,18 +46,22 @@ class RotationChain {
     Eigen::Vector3d PhiPerSecond() const { return J_phi_theta * omega_gyro_rad_s; }
   };
 
-  // times_s: strictly increasing, at least two. Rates [rad/s] as columns.
-  RotationChain(const std::vector<double>& times_s, const Eigen::Matrix3Xd& omega_gyro_rad_s);
+  // times_s: strictly increasing, at least two. Rates [rad/s] as columns. value_of: neighbouring
+  // rates may follow one value, which is added to them; its number for each rate, from 0 on and
+  // ascending by 0 or 1. Empty: each rate has its own.
+  RotationChain(const std::vector<double>& times_s, const Eigen::Matrix3Xd& omega_gyro_rad_s,
+                const std::vector<int>& value_of = {});
 
   int size() const { return static_cast<int>(times_s_.size()); }
+  int num_values() const { return value_of_.back() + 1; }
   const std::vector<double>& times_s() const { return times_s_; }
 
   State At(double time_s) const;
 
   using RateGradient = Eigen::Ref<Eigen::Matrix3Xd, 0, Eigen::OuterStride<3>>;  // without gaps
-  // Adds to `gradient` (3 x size) the derivative of a scalar by every rate, given its derivatives
-  // by the left perturbation phi of R_ref_gyro and by the rate at that time. Columns after
-  // state.segment + 1 stay untouched.
+  // Adds to `gradient` (3 x num_values) the derivative of a scalar by every value, given its
+  // derivatives by the left perturbation phi of R_ref_gyro and by the rate at that time. Columns
+  // after the value of rate state.segment + 1 stay untouched.
   void AddRateGradient(const State& state, const Eigen::Vector3d& by_phi,
                        const Eigen::Vector3d& by_omega, RateGradient gradient) const;
 
@@ -65,9 +69,10 @@ class RotationChain {
   std::vector<double> times_s_;
   Eigen::Matrix3Xd omega_;
   std::vector<Eigen::Matrix3d> prefix_;  // R_ref_gyro at each sample
-  // Three rows for each sample: transposed derivative of the left perturbation of R_ref_gyro by its
-  // rate, through the segment before it, and through that and the one after it.
-  Eigen::Matrix<double, Eigen::Dynamic, 3> before_, around_;
+  std::vector<int> value_of_;
+  // Transposed derivatives of the left perturbation of R_ref_gyro, three rows each: at sample k, by
+  // the value of its rate, through the segments before it; and by a value through all segments.
+  Eigen::Matrix<double, Eigen::Dynamic, 3> until_, whole_;
 };
 
 }  // namespace camgyro

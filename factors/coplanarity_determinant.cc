@@ -28,8 +28,7 @@ bool CoplanarityDeterminant::Evaluate(double const* const* parameters, double* r
   using Eigen::Vector3d;
   const PairMeasurement& pair = *pair_;
   const int first_rate_group = kEffectsBlock + NumEffectBlocks(pair);
-  const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + first_rate_group);
-  const RotationChain chain(pair.rate_times_s, rates);
+  const RotationChain chain = ChainOf(pair, parameters + first_rate_group);
   PairBearings bearings;
   if (!EvaluatePairBearings(pair, chain, parameters[0], parameters[1], parameters[2],
                             pair.effects ? parameters[kEffectsBlock] : nullptr,
@@ -37,7 +36,7 @@ bool CoplanarityDeterminant::Evaluate(double const* const* parameters, double* r
     return false;
   }
   const double var_a = pair.variance_a(), var_b = pair.variance_b();
-  PairRow row(chain.size());
+  PairRow row(chain);
   for (size_t t = 0; t < triplets_.size(); ++t) {
     std::array<const Bearing*, 3> a, b;
     std::array<Vector3d, 3> n, c;  // cross products, and derivative of the determinant by each

@@ -53,14 +53,13 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
   const PairMeasurement& pair = *pair_;
   const int times_block = kEffectsBlock + NumEffectBlocks(pair);
   const int first_rate_group = times_block + NumTimeBlocks(pair);
-  const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + first_rate_group);
-  const RotationChain chain(pair.rate_times_s, rates);
+  const RotationChain chain = ChainOf(pair, parameters + first_rate_group);
   const BearingsOfMatch bearings(pair, chain, parameters[0], parameters[1], parameters[2],
                                  pair.effects ? parameters[kEffectsBlock] : nullptr,
                                  pair.own_times ? parameters + times_block : nullptr);
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
   const Eigen::Map<const Eigen::Matrix<double, 3, 2>> bend(parameters[kBendBlock]);
-  PairRow row(chain.size());
+  PairRow row(chain);
   Bearing a, b;
   for (size_t i = 0; i < pair.matches.size(); ++i) {
     if (!bearings.Evaluate(i, jacobians != nullptr, &a, &b)) return false;

@@ -74,6 +74,21 @@ Eigen::Matrix3Xd GatherRates(const PairMeasurement& pair, const double* const* g
   return rates;
 }
 
+std::vector<int> PairMeasurement::RateValues() const {
+  std::vector<int> values;
+  values.reserve(rate_times_s.size());
+  int first = 0;
+  for (size_t g = 0; g < rate_group_sizes.size(); ++g) {
+    for (int i = 0; i < rate_group_sizes[g]; ++i) values.push_back(first + i / rate_step);
+    first += num_rate_values(g);
+  }
+  return values;
+}
+
+RotationChain ChainOf(const PairMeasurement& pair, const double* const* groups) {
+  return {pair.rate_times_s, GatherRates(pair, groups), pair.RateValues()};
+}
+
 void PairRow::Write(int row, double scale, const double* q_gyro_cam, const PairMeasurement& pair,
                     int first_rate_group, double** jacobians) const {
   if (jacobians[0] != nullptr) {
@@ -95,18 +110,13 @@ void PairRow::Write(int row, double scale, const double* q_gyro_cam, const PairM
         scale * gradient_.by_effects;
   }
   int column = 0;
-  const std::vector<int>& group_sizes = pair.rate_group_sizes;
-  for (size_t g = 0; g < group_sizes.size(); ++g) {
-    double* jacobian = jacobians[static_cast<size_t>(first_rate_group) + g];
-    if (jacobian != nullptr) {
-      const int values = pair.num_rate_values(g);
-      Eigen::Map<Eigen::Matrix3Xd> J(jacobian + row * 3 * values, 3, values);
-      for (int k = 0, first = 0; k < values; ++k, first += pair.rate_step) {
-        const int count = std::min(pair.rate_step, group_sizes[g] - first);
-        J.col(k) = scale * by_rates_.middleCols(column + first, count).rowwise().sum();
-      }
+  for (size_t g = 0; g < pair.rate_group_sizes.size(); ++g) {
+    const int values = pair.num_rate_values(g);
+    if (double* jacobian = jacobians[static_cast<size_t>(first_rate_group) + g]) {
+      Eigen::Map<Eigen::Matrix3Xd>(jacobian + row * 3 * values, 3, values) =
+          scale * by_rates_.middleCols(column, values);
     }
-    column += group_sizes[g];
+    column += values;
   }
 }
 

@@ -47,6 +47,8 @@ struct PairMeasurement {
   int num_rate_values(size_t group) const {
     return (rate_group_sizes[group] + rate_step - 1) / rate_step;
   }
+  // Which value each sample's rate follows, counted over all groups.
+  std::vector<int> RateValues() const;
 
   double variance_a() const { return noise == MatchNoise::kBothImages ? sigma * sigma : 0.0; }
   double variance_b() const { return sigma * sigma; }
@@ -96,13 +98,15 @@ class BearingsOfMatch {
 
 // The rates of a pair's samples as columns.
 Eigen::Matrix3Xd GatherRates(const PairMeasurement& pair, const double* const* groups);
+// The chain of these rates, with derivatives by the groups' parameters.
+RotationChain ChainOf(const PairMeasurement& pair, const double* const* groups);
 // Of groups whose parameters are the rates themselves.
 Eigen::Matrix3Xd GatherRates(const std::vector<int>& group_sizes, const double* const* groups);
 
 // One row of a residual's Jacobian, before it is written to Ceres' blocks.
 class PairRow {
  public:
-  explicit PairRow(int num_rates) : by_rates_(3, num_rates) {}
+  explicit PairRow(const RotationChain& chain) : by_rates_(3, chain.num_values()) {}
 
   void Clear() {
     gradient_ = PairGradient();

@@ -76,8 +76,7 @@ SymmetricTransfer::SymmetricTransfer(std::shared_ptr<const PairMeasurement> pair
 bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residuals,
                                  double** jacobians) const {
   const PairMeasurement& pair = *pair_;
-  const Eigen::Matrix3Xd rates = GatherRates(pair, parameters + kFirstRateGroup);
-  const RotationChain chain(pair.rate_times_s, rates);
+  const RotationChain chain = ChainOf(pair, parameters + kFirstRateGroup);
   const LensParameters lens = Eigen::Map<const LensParameters>(parameters[0]);
   PairBearings bearings;
   const bool derivatives = jacobians != nullptr;
@@ -86,7 +85,7 @@ bool SymmetricTransfer::Evaluate(double const* const* parameters, double* residu
     return false;
   }
   const double inv_sigma = 1.0 / std::sqrt(2.0 * (pair.variance_a() + pair.variance_b()));
-  PairRow row(chain.size());
+  PairRow row(chain);
   Transfer into_a, into_b;
   for (size_t i = 0; i < pair.matches.size(); ++i) {
     const Bearing &a = bearings.a[i], &b = bearings.b[i];

@@ -7,7 +7,6 @@
 #include <limits>
 #include <utility>
 
-#include "factors/coplanarity_plane.h"
 #include "factors/robust.h"
 
 namespace camgyro {
@@ -59,20 +58,49 @@ struct TwoMatches {
     return (e1 * e1 + e3 * e3) + (e2 * e2 + e4 * e4);
   }
 
+  // The residuals in sigmas, without loss, and their derivatives by x.
+  Two Residuals(const std::array<Two, 3>& x, std::array<Two, 3>* by_x) const {
+    std::array<Two, kForms> e;
+    Two variance = Two::Constant(1e-30);
+    for (int form = 0; form < kForms; ++form) {
+      const auto k = static_cast<size_t>(form);
+      e[k] = Form(form, x);
+      if (form > 0) variance += e[k] * e[k];
+    }
+    const Two inv_sigma = 1.0 / variance.sqrt(), residuals = e[0] * inv_sigma;
+    // dr = de / sigma - (e / sigma^3) d(sigma^2 / 2)
+    const Two factor = residuals * inv_sigma * inv_sigma;
+    for (int c = 0; c < 3; ++c) {
+      Two half_variance_by = Two::Zero();
+      for (int form = 1; form < kForms; ++form) {
+        half_variance_by += e[static_cast<size_t>(form)] * forms.col(3 * form + c).array();
+      }
+      (*by_x)[static_cast<size_t>(c)] =
+          inv_sigma * forms.col(c).array() - factor * half_variance_by;
+    }
+    return residuals;
+  }
+
   Eigen::Matrix<double, 2, 3 * kForms> forms = Eigen::Matrix<double, 2, 3 * kForms>::Zero();
   Eigen::Matrix<double, 2, 3> ray_b = Eigen::Matrix<double, 2, 3>::Zero();
   int count = 0;
 };
 
 std::vector<TwoMatches> Prepare(const PairBearings& bearings, double variance_a, double variance_b,
-                                size_t stride) {
+                                size_t first, size_t stride) {
   std::vector<TwoMatches> matches;
-  for (size_t i = 0; i < bearings.a.size(); i += stride) {
+  matches.reserve((bearings.a.size() / stride + 2) / 2);
+  for (size_t i = first; i < bearings.a.size(); i += stride) {
     if (matches.empty() || matches.back().count == 2) matches.emplace_back();
     TwoMatches& two = matches.back();
     two.Set(two.count, bearings.a[i], bearings.b[i], variance_a, variance_b);
   }
   return matches;
+}
+
+std::array<TwoMatches::Two, 3> AtBoth(const Vector3d& x) {
+  using Two = TwoMatches::Two;
+  return {Two::Constant(x[0]), Two::Constant(x[1]), Two::Constant(x[2])};
 }
 
 // The sum, or something beyond `bound` if the sum is.
@@ -81,8 +109,7 @@ double Cost(const std::vector<TwoMatches>& matches, double threshold, const Vect
   using Two = TwoMatches::Two;
   const double k_sq =
       threshold > 0.0 ? threshold * threshold : std::numeric_limits<double>::infinity();
-  const std::array<Two, 3> x = {Two::Constant(tau[0]), Two::Constant(tau[1]),
-                                Two::Constant(tau[2])};
+  const std::array<Two, 3> x = AtBoth(tau);
   double cost = 0.0;
   for (const TwoMatches& two : matches) {
     const Two e = two.Form(0, x), e_sq = e * e, variance = two.Variance(x) + 1e-30;
@@ -122,9 +149,7 @@ struct Refined {
   double cost;
 };
 
-// matches: those of the bearings.
-Refined Refine(const PairBearings& bearings, const std::vector<TwoMatches>& matches,
-               double variance_a, double variance_b, double threshold, Vector3d tau) {
+Refined Refine(const std::vector<TwoMatches>& matches, double threshold, Vector3d tau) {
   double cost = Cost(matches, threshold, tau);
   double damping = 1e-3;
   for (int iteration = 0; iteration < 8; ++iteration) {
@@ -133,14 +158,18 @@ Refined Refine(const PairBearings& bearings, const std::vector<TwoMatches>& matc
     basis << u, v;
     Eigen::Matrix2d H = Eigen::Matrix2d::Zero();
     Eigen::Vector2d g = Eigen::Vector2d::Zero();
-    for (size_t i = 0; i < bearings.a.size(); ++i) {
-      const PlaneResidual r = EvaluatePlaneResidual(bearings.a[i].ray_ref, bearings.a[i].J_ray_px,
-                                                    bearings.b[i].ray_ref, bearings.b[i].J_ray_px,
-                                                    tau, variance_a, variance_b);
-      const RobustResidual robust = Robustify(r.value, threshold);
-      const Eigen::Vector2d J = robust.derivative * (basis.transpose() * r.by_tau);
-      H += J * J.transpose();
-      g += J * robust.value;
+    const std::array<TwoMatches::Two, 3> x = AtBoth(tau);
+    std::array<TwoMatches::Two, 3> by_x;
+    for (const TwoMatches& two : matches) {
+      const TwoMatches::Two residuals = two.Residuals(x, &by_x);
+      const TwoMatches::Two by_u = by_x[0] * u[0] + by_x[1] * u[1] + by_x[2] * u[2],
+                            by_v = by_x[0] * v[0] + by_x[1] * v[1] + by_x[2] * v[2];
+      for (int k = 0; k < two.count; ++k) {
+        const RobustResidual robust = Robustify(residuals[k], threshold);
+        const Eigen::Vector2d J = robust.derivative * Eigen::Vector2d(by_u[k], by_v[k]);
+        H += J * J.transpose();
+        g += J * robust.value;
+      }
     }
     H.diagonal() *= 1.0 + damping;
     H.diagonal().array() += 1e-12;
@@ -165,26 +194,30 @@ Refined Refine(const PairBearings& bearings, const std::vector<TwoMatches>& matc
 
 double CostOfPointsBehind(const PairBearings& bearings, double variance_a, double variance_b,
                           double robust_threshold, const Vector3d& tau) {
-  return CostOfPointsBehind(Prepare(bearings, variance_a, variance_b, 1), robust_threshold, tau);
+  return CostOfPointsBehind(Prepare(bearings, variance_a, variance_b, 0, 1), robust_threshold, tau);
 }
 
 DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
-                                double robust_threshold) {
+                                double robust_threshold, size_t first, size_t step) {
   static const std::vector<Vector3d> grid = HalfSphere(120);
   std::vector<Vector3d> candidates = grid;
-  const size_t n = bearings.a.size();
+  const size_t n = (bearings.a.size() + step - 1 - first) / step;
+  const auto normal = [&](size_t i) -> Vector3d {
+    return bearings.a[first + step * i].ray_ref.cross(bearings.b[first + step * i].ray_ref);
+  };
   // Two matches give a direction: their cross products' cross product.
   for (size_t k = 0; k < 20 && n >= 2; ++k) {
     const size_t i = (k * 7919) % n, j = (i + 1 + (k * 104729) % (n - 1)) % n;
-    const Vector3d tau = bearings.a[i]
-                             .ray_ref.cross(bearings.b[i].ray_ref)
-                             .cross(bearings.a[j].ray_ref.cross(bearings.b[j].ray_ref));
+    const Vector3d tau = normal(i).cross(normal(j));
     if (tau.norm() > 1e-14) candidates.push_back(tau.normalized());
   }
   // Some 60 matches rank the candidates well enough; the refinement uses them all.
   const size_t stride = std::max<size_t>(1, n / 60);
-  const std::vector<TwoMatches> all = Prepare(bearings, variance_a, variance_b, 1),
-                                some = Prepare(bearings, variance_a, variance_b, stride);
+  const std::vector<TwoMatches> all = Prepare(bearings, variance_a, variance_b, first, step),
+                                fewer = stride > 1 ? Prepare(bearings, variance_a, variance_b,
+                                                             first, step * stride)
+                                                   : std::vector<TwoMatches>();
+  const std::vector<TwoMatches>& some = stride > 1 ? fewer : all;
   std::vector<std::pair<double, size_t>> ranked;  // the best three
   for (size_t c = 0; c < candidates.size(); ++c) {
     const double bound =
@@ -198,8 +231,7 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
   }
   DirectionEstimate best;
   for (size_t s = 0; s < ranked.size(); ++s) {
-    const Refined refined = Refine(bearings, all, variance_a, variance_b, robust_threshold,
-                                   candidates[ranked[s].second]);
+    const Refined refined = Refine(all, robust_threshold, candidates[ranked[s].second]);
     const double cost = refined.cost + CostOfPointsBehind(all, robust_threshold, refined.tau);
     if (s == 0 || cost < best.cost) {
       best.tau = refined.tau;
@@ -207,11 +239,11 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
     }
   }
   best.residuals.reserve(n);
-  for (size_t i = 0; i < n; ++i) {
-    best.residuals.push_back(EvaluatePlaneResidual(bearings.a[i].ray_ref, bearings.a[i].J_ray_px,
-                                                   bearings.b[i].ray_ref, bearings.b[i].J_ray_px,
-                                                   best.tau, variance_a, variance_b)
-                                 .value);
+  const std::array<TwoMatches::Two, 3> x = AtBoth(best.tau);
+  std::array<TwoMatches::Two, 3> by_x;
+  for (const TwoMatches& two : all) {
+    const TwoMatches::Two residuals = two.Residuals(x, &by_x);
+    best.residuals.insert(best.residuals.end(), residuals.data(), residuals.data() + two.count);
   }
   return best;
 }

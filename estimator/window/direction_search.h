@@ -19,9 +19,9 @@ struct DirectionEstimate {
 // Minimises the robust plane residuals over the unit sphere: cost on a fixed grid of directions
 // and at the cross products of some pairs of matches, each point behind the camera counted as an
 // outlier, then Gauss-Newton with the derivative of sigma from the best three, to the accuracy that
-// a joint solve can start from. Deterministic.
+// a joint solve can start from. Deterministic. Of the matches first, first + step, ...
 DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
-                                double robust_threshold);
+                                double robust_threshold, size_t first = 0, size_t step = 1);
 
 // Cost of a direction beyond its residuals [sigmas^2]: matches that
 // would lie behind the camera count as outliers, for the sign of tau that leaves fewer of them.

@@ -149,13 +149,10 @@ Eigen::Vector2d StepOfTimes(const PairView& view, const PairPlane& plane, double
 
 PairPlane FitPlane(const PairView& view, size_t first, size_t step) {
   const PairMeasurement& m = view.measurement;
-  PairBearings some;
-  for (size_t i = first; i < m.matches.size(); i += step) {
-    some.a.push_back(view.bearings.a[i]);
-    some.b.push_back(view.bearings.b[i]);
-  }
   PairPlane plane;
-  plane.tau = FindDirection(some, m.variance_a(), m.variance_b(), m.robust_threshold).tau;
+  plane.tau =
+      FindDirection(view.bearings, m.variance_a(), m.variance_b(), m.robust_threshold, first, step)
+          .tau;
   // A bend is close to linear: a few steps of Gauss-Newton.
   double cost = std::numeric_limits<double>::infinity();
   PairPlane next = plane;

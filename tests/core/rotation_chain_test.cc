@@ -111,6 +111,29 @@ TEST(RotationChain, GradientByRatesMatchesDifferences) {
   }
 }
 
+// A value that neighbouring rates follow moves each of them: its derivative is the sum of theirs.
+TEST(RotationChain, GradientByValuesIsTheSumOverTheirRates) {
+  const Chain c = RandomChain(5, 8);
+  const std::vector<int> value_of = {0, 0, 0, 1, 2, 2, 2, 3};
+  const RotationChain by_rates(c.times, c.rates), by_values(c.times, c.rates, value_of);
+  ASSERT_EQ(by_rates.num_values(), 8);
+  ASSERT_EQ(by_values.num_values(), 4);
+  const Vector3d by_phi(1.0, -2.0, 0.5), by_omega(0.1, 0.4, -0.3);
+  // Before the first rate, within values, on their borders, after the last rate.
+  for (const double t :
+       {c.times[0] - 0.004, c.times[1], c.times[1] + 0.001, c.times[2] + 0.001, c.times[3],
+        c.times[4], c.times[5] + 0.001, c.times[6] + 0.001, c.times[7], c.times[7] + 0.005}) {
+    const auto state = by_values.At(t);
+    EXPECT_EQ(state.R_ref_gyro, by_rates.At(t).R_ref_gyro);
+    Matrix3Xd of_rates = Matrix3Xd::Zero(3, 8), of_values = Matrix3Xd::Zero(3, 4);
+    by_rates.AddRateGradient(state, by_phi, by_omega, of_rates);
+    by_values.AddRateGradient(state, by_phi, by_omega, of_values);
+    Matrix3Xd sums = Matrix3Xd::Zero(3, 4);
+    for (int i = 0; i < 8; ++i) sums.col(value_of[static_cast<size_t>(i)]) += of_rates.col(i);
+    EXPECT_LT((of_values - sums).norm(), 1e-12) << t;
+  }
+}
+
 // A swing about one axis, whose angle is known: straight lines between its samples lose
 // (omega h)^2 / 12 of it, which is 2e-3 here, and straight lines between ChainRates next to
 // nothing. Uneven samples too.
