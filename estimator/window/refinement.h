@@ -20,7 +20,10 @@ struct PairLatents;
 
 struct RefinementOptions {
   PairGraphOptions graph;
-  int max_rounds = 6;  // noise scale, directions and solve, until the estimate settles
+  // Noise scale, directions and solve, until the estimate settles: it does so in two or three, or,
+  // where the start is far off and little is determined, in up to nine
+  // (FaultsTest.TheLightFlickers).
+  int max_rounds = 12;
   // It has settled when a round, with its new directions, has moved the state by less than this, in
   // sigmas (Mahalanobis distance, and each parameter by itself).
   double settled_round = 0.3;
