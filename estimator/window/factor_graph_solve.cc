@@ -39,10 +39,10 @@ ceres::Solver::Options CeresOptions(const SolveOptions& options) {
       std::max(ceres_options.max_trust_region_radius, options.trust_region_radius);
   ceres_options.gradient_tolerance = 0.0;
   ceres_options.parameter_tolerance = 0.0;
-  // As fast as any for the window, and near the fastest for the refinement
-  // (docs/lab/performance.md).
+  // The fastest for the window and as fast as any for the refinement (docs/lab/performance.md).
+  // SuiteSparse's would wake threads of its BLAS for each small matrix.
   ceres_options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  ceres_options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  ceres_options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
   return ceres_options;
 }
 

@@ -15,6 +15,11 @@
 namespace camgyro {
 namespace {
 
+// A pair keeps its linearisation while its direction and bend have moved by less than this [rad],
+// too: a pair with little parallax hardly knows its direction, and turning it moves no residual
+// much although each of them bends.
+constexpr double kHeldTurn = 0.01;
+
 std::shared_ptr<const EffectSet> WithParameters(const Calibration& start) {
   return start.effects && start.effects->size() > 0 ? start.effects : nullptr;
 }
@@ -192,9 +197,15 @@ AddPairResult PairGraph::AddPair(const TimedPair& timed) {
 
 void PairGraph::MakeFactor(int64_t id, Pair* pair) {
   std::shared_ptr<const ceres::CostFunction> cost = residual().MakeCost(pair->measurement, id);
-  if (options_.remember_jacobians) {
-    pair->remembered = std::make_shared<RememberedCost>(std::move(cost));
-    cost = pair->remembered;
+  if (options_.keep_within_sigmas >= 0.0) {
+    KeepBounds bounds{options_.keep_within_sigmas, {}};
+    if (residual().facts().has_direction) {
+      bounds.blocks = {{CoplanarityPlane::kTauBlock, kHeldTurn},
+                       {CoplanarityPlane::kBendBlock, kHeldTurn}};
+    }
+    pair->kept = std::make_shared<KeptCost>(std::move(cost), std::move(bounds));
+    pair->last.linearisation = 0;
+    cost = pair->kept;
   }
   pair->factor = graph_.AddFactor(std::move(cost), BlocksOf(id, *pair));
 }
@@ -337,7 +348,7 @@ void PairGraph::SetSigma(int64_t id, double sigma) {
   Pair& pair = pairs_.at(id);
   if (pair.measurement->sigma == sigma) return;
   pair.measurement->sigma = sigma;
-  if (pair.remembered) pair.remembered->Forget();
+  if (pair.kept) pair.kept->Forget();
 }
 
 std::vector<int64_t> PairGraph::pair_ids() const {

@@ -17,10 +17,10 @@
 #include "core/result.h"
 #include "estimator/window/factor_graph.h"
 #include "estimator/window/frame_times.h"
+#include "estimator/window/kept_cost.h"
 #include "estimator/window/pair_graph_options.h"
 #include "estimator/window/pair_view.h"
 #include "estimator/window/rate_groups.h"
-#include "estimator/window/remembered_cost.h"
 #include "estimator/window/timed_pair.h"
 #include "estimator/window/track_lean.h"
 #include "factors/coplanarity_plane.h"
@@ -96,7 +96,8 @@ class PairGraph {
     return Residuals(id, search, &bearings_);
   }
   // Without a search; adds how far each match is to one side of its plane, where pairs have a
-  // direction.
+  // direction. While a pair keeps its linearisation, these are those of before: they have changed
+  // by less than the bounds of KeptCost.
   std::vector<double> ResidualsWithLeans(int64_t id, TrackLeans* leans);
   // Takes the matches of these tracks (ascending ids) out of the pairs, where kMinMatches are left.
   void LeaveOutTracks(const std::vector<int64_t>& track_ids);
@@ -152,13 +153,19 @@ class PairGraph {
  private:
   struct Pair {
     std::shared_ptr<PairMeasurement> measurement;  // the factor reads its noise at every evaluation
-    std::shared_ptr<RememberedCost> remembered;    // the factor's cost, if it is one
+    std::shared_ptr<KeptCost> kept;                // the factor's cost, if it is one
     std::vector<int64_t> groups;
     FactorGraph::FactorKey factor = 0;
     double time_s = 0.0;
     BendVector bend_sigma_rad;              // prior
     FactorGraph::FactorKey bend_prior = 0;  // of pairs that have a bend
     std::vector<int64_t> frame_times;       // blocks of its two frames' times, if they have any
+    // Of ResidualsWithLeans, while the linearisation is still the one that it was then.
+    struct {
+      int64_t linearisation = 0;
+      std::vector<double> residuals;
+      TrackLeans leans;
+    } last;
   };
 
   const PairResidual& residual() const { return *options_.residual; }

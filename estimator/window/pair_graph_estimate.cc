@@ -45,14 +45,22 @@ PairView PairGraph::ViewOf(const Pair& pair, const PairBearings& bearings) const
 }
 
 std::vector<double> PairGraph::ResidualsWithLeans(int64_t id, TrackLeans* leans) {
-  std::vector<double> residuals = Residuals(id, /*search=*/false);
-  if (residuals.empty() || !residual().facts().has_direction) return residuals;
-  const PairView view = ViewOf(pairs_.at(id), bearings_);
-  const PairPlane plane{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
-  for (size_t i = 0; i < residuals.size(); ++i) {
-    leans->Add(view.measurement.matches[i].track_id, residuals[i], CorrectionOf(view, plane, i));
+  Pair& pair = pairs_.at(id);
+  const int64_t linearisation = pair.kept ? pair.kept->number() : 0;
+  if (linearisation == 0 || pair.last.linearisation != linearisation) {
+    pair.last = {linearisation, Residuals(id, /*search=*/false), {}};
+    const std::vector<double>& residuals = pair.last.residuals;
+    if (!residuals.empty() && residual().facts().has_direction) {
+      const PairView view = ViewOf(pair, bearings_);
+      const PairPlane plane{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+      for (size_t i = 0; i < residuals.size(); ++i) {
+        pair.last.leans.Add(view.measurement.matches[i].track_id, residuals[i],
+                            CorrectionOf(view, plane, i));
+      }
+    }
   }
-  return residuals;
+  leans->Add(pair.last.leans);
+  return pair.last.residuals;
 }
 
 CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {

@@ -27,9 +27,10 @@ struct PairGraphOptions {
   // Matches without a ray through the lens as the effects make it at the start are left out, for
   // good; else such a start has no solution. (Without effects, they always are.)
   bool drop_without_ray = false;
-  // Each pair keeps its last Jacobian (RememberedCost): for few pairs that are solved again and
-  // again.
-  bool remember_jacobians = false;
+  // Each pair keeps its linearisation while its residuals change by less than this, root mean
+  // square (KeptCost): for few pairs that are solved again and again. 0: while nothing changes.
+  // Negative: not at all.
+  double keep_within_sigmas = -1.0;
   // White noise of one gyro sample per axis (Jia & Evans section V.C); see GyroSigma.
   Eigen::Vector3d gyro_sigma_rad_s = Eigen::Vector3d::Constant(0.003);
   double bias_walk_rad_s2_rtHz = 1e-4;

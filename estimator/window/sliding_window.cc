@@ -17,8 +17,13 @@ namespace {
 // they have computed with it stays valid, and no sigma changes by more.
 constexpr double kSameNoise = 0.01;
 
-PairGraphOptions Remembering(PairGraphOptions options) {
-  options.remember_jacobians = true;
+// Once the estimate has settled, pairs keep their linearisation while their residuals change by
+// less than this. Before, steps are large, and where little is determined their end depends on
+// each.
+constexpr double kKeptWithinSigmas = 0.1;
+
+PairGraphOptions Keeping(PairGraphOptions options) {
+  options.keep_within_sigmas = 0.0;
   return options;
 }
 
@@ -28,7 +33,7 @@ SlidingWindow::SlidingWindow(const Calibration& start, const Prior& prior, int64
                              const SlidingWindowOptions& options)
     : options_(options),
       origin_ns_(origin_ns),
-      graph_(start, prior, Remembering(options.graph)),
+      graph_(start, prior, Keeping(options.graph)),
       noise_scale_(options.graph.residual->facts()),
       noise_px_(options.graph.first_sigma()),
       noise_of_pairs_px_(noise_px_) {
@@ -137,7 +142,10 @@ void SlidingWindow::Process(const Pending& pair) {
     return;
   }
   failure_.clear();
-  settled_ = settled_ || Settled(update.estimate);
+  if (!settled_ && Settled(update.estimate)) {
+    settled_ = true;
+    graph_.options()->keep_within_sigmas = kKeptWithinSigmas;  // of the pairs to come
+  }
   update.frame_stamp_ns = pair.stamp_b_ns;
   update.noise_px = noise_px_;
   update.settled = settled_;

@@ -158,15 +158,16 @@ class DenseSolver {
   double cost_ = 0.0;
 };
 
-void ExpectSolvedToTheMinimum(const FactorGraph& problem) {
+// cost: relative; distance: in sigmas.
+void ExpectSolvedToTheMinimum(const FactorGraph& problem, double cost, double distance) {
   FactorGraph solved = problem;
   const SolveReport report = solved.Solve({200, 1e-14});
   ASSERT_TRUE(report.usable) << report.message;
   DenseSolver dense(problem);
   dense.Solve();
   EXPECT_LT(dense.cost(), report.initial_cost);
-  EXPECT_NEAR(report.final_cost, dense.cost(), 1e-8 * dense.cost());
-  EXPECT_LT(dense.DistanceInSigmas(solved).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_NEAR(report.final_cost, dense.cost(), cost * dense.cost());
+  EXPECT_LT(dense.DistanceInSigmas(solved).cwiseAbs().maxCoeff(), distance);
 }
 
 TEST(FactorGraphSolve, FindsTheMinimumOfAWindow) {
@@ -178,7 +179,8 @@ TEST(FactorGraphSolve, FindsTheMinimumOfAWindow) {
   ASSERT_LT(window.graph().num_pairs(), window.num_used_pairs());
   FactorGraph problem = window.graph().graph();
   problem.value({BlockKind::kShutter, 0}) += Eigen::Vector2d(2e-4, 2e-4);  // off what was found
-  ExpectSolvedToTheMinimum(problem);
+  // A pair of a window is linear while its residuals change by less than a tenth of a sigma.
+  ExpectSolvedToTheMinimum(problem, 1e-4, 0.05);
 }
 
 TEST(FactorGraphSolve, FindsTheMinimumOfARefinement) {
@@ -191,7 +193,7 @@ TEST(FactorGraphSolve, FindsTheMinimumOfARefinement) {
   for (const TimedRate& rate : input.rates) graph.AddRate(rate);
   for (const TimedPair& pair : input.pairs) graph.AddPair(pair);
   ASSERT_GT(graph.num_pairs(), 40);
-  ExpectSolvedToTheMinimum(graph.graph());
+  ExpectSolvedToTheMinimum(graph.graph(), 1e-8, 1e-3);
 }
 
 }  // namespace

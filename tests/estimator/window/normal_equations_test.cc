@@ -13,7 +13,7 @@ namespace {
 
 BlockId Bias(int64_t i) { return {BlockKind::kBias, i}; }
 BlockId Rates(int64_t i) { return {BlockKind::kRates, i}; }
-BlockId FrameTime(int64_t i) { return {BlockKind::kFrameTime, 1'000'000 * i}; }
+BlockId FrameTimeId(int64_t i) { return {BlockKind::kFrameTime, 1'000'000 * i}; }
 BlockId Direction(int64_t i) { return {BlockKind::kDirection, i}; }
 
 // Of scalars: pair i has a direction, the times of frames i and i + 1, and the rates of groups i
@@ -37,9 +37,9 @@ FactorGraph ChainOfPairs(int pairs, bool frame_times) {
     add(Rates(i + 1), {Bias((i + 1) / 4)});
     std::vector<BlockId> touched = {Rates(i), Rates(i + 1)};
     if (frame_times) {
-      add(FrameTime(i), {});
-      add(FrameTime(i + 1), {});
-      touched.insert(touched.end(), {FrameTime(i), FrameTime(i + 1)});
+      add(FrameTimeId(i), {});
+      add(FrameTimeId(i + 1), {});
+      touched.insert(touched.end(), {FrameTimeId(i), FrameTimeId(i + 1)});
     }
     add(Direction(i), touched);
   }

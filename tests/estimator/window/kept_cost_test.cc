@@ -1,8 +1,10 @@
-#include "estimator/window/remembered_cost.h"
+#include "estimator/window/kept_cost.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <memory>
 
@@ -43,25 +45,25 @@ struct Value {
   std::array<double, 2> by_y{};
 };
 
-class RememberedCostTest : public testing::Test {
+class KeptCostTest : public testing::Test {
  protected:
-  bool Evaluate(bool by_x, bool by_y, Value* result) {
+  bool Evaluate(const KeptCost& kept, bool by_x, bool by_y, Value* result) {
     const double* parameters[] = {x_.data(), &y_};
     double* jacobians[] = {by_x ? result->by_x.data() : nullptr,
                            by_y ? result->by_y.data() : nullptr};
-    return remembered_.Evaluate(parameters, result->residuals.data(),
-                                by_x || by_y ? jacobians : nullptr);
+    return kept.Evaluate(parameters, result->residuals.data(), by_x || by_y ? jacobians : nullptr);
   }
+  bool Evaluate(bool by_x, bool by_y, Value* result) { return Evaluate(kept_, by_x, by_y, result); }
 
   const std::shared_ptr<Counted> inner_ = std::make_shared<Counted>();
-  RememberedCost remembered_{inner_};
+  KeptCost kept_{inner_, {}};
   std::array<double, 2> x_ = {1.0, 2.0};
   double y_ = 3.0;
 };
 
-TEST_F(RememberedCostTest, GivesTheSameAgainWithoutAnEvaluation) {
-  EXPECT_EQ(remembered_.num_residuals(), 2);
-  EXPECT_EQ(remembered_.parameter_block_sizes(), inner_->parameter_block_sizes());
+TEST_F(KeptCostTest, GivesTheSameAgainWithoutAnEvaluation) {
+  EXPECT_EQ(kept_.num_residuals(), 2);
+  EXPECT_EQ(kept_.parameter_block_sizes(), inner_->parameter_block_sizes());
   Value first, second, residuals_only;
   ASSERT_TRUE(Evaluate(true, true, &first));
   ASSERT_TRUE(Evaluate(true, true, &second));
@@ -74,34 +76,73 @@ TEST_F(RememberedCostTest, GivesTheSameAgainWithoutAnEvaluation) {
   EXPECT_EQ(second.by_y, (std::array<double, 2>{2.0, 6.0}));
 }
 
-TEST_F(RememberedCostTest, EvaluatesWhatIsNew) {
+TEST_F(KeptCostTest, EvaluatesWhatIsNew) {
   Value result;
+  EXPECT_EQ(kept_.number(), 0);
   ASSERT_TRUE(Evaluate(true, false, &result));
   ASSERT_TRUE(Evaluate(true, true, &result));  // a block that was not asked for
-  EXPECT_EQ(inner_->count, 2);
+  EXPECT_EQ(inner_->count, 1);
+  EXPECT_EQ(result.by_y, (std::array<double, 2>{2.0, 6.0}));
+  const int64_t first = kept_.number();
   x_[1] = -2.0;
   ASSERT_TRUE(Evaluate(true, true, &result));
-  EXPECT_EQ(inner_->count, 3);
+  EXPECT_EQ(inner_->count, 2);
   EXPECT_EQ(result.residuals[0], -5.0);
+  EXPECT_NE(kept_.number(), first);
   inner_->scale = 2.0;
-  remembered_.Forget();
+  kept_.Forget();
+  EXPECT_EQ(kept_.number(), 0);
   ASSERT_TRUE(Evaluate(true, true, &result));
-  EXPECT_EQ(inner_->count, 4);
+  EXPECT_EQ(inner_->count, 3);
   EXPECT_EQ(result.residuals[0], -10.0);
 }
 
-TEST_F(RememberedCostTest, FailuresAndResidualsAloneAreNotRemembered) {
+// By y the residuals move by (2, 6) dy, of which the root mean square is sqrt(20) dy.
+TEST_F(KeptCostTest, StaysLinearWithinItsBounds) {
+  const KeptCost kept(inner_, {std::sqrt(20.0) * 0.01, {}});
   Value result;
-  ASSERT_TRUE(Evaluate(false, false, &result));
-  ASSERT_TRUE(Evaluate(false, false, &result));
+  ASSERT_TRUE(Evaluate(kept, true, true, &result));
+  const int64_t first = kept.number();
+  y_ = 3.0 + 0.0099;
+  ASSERT_TRUE(Evaluate(kept, false, false, &result));
+  EXPECT_EQ(inner_->count, 1);
+  EXPECT_EQ(kept.number(), first);
+  EXPECT_NEAR(result.residuals[0], 7.0 + 2.0 * 0.0099, 1e-12);
+  EXPECT_NEAR(result.residuals[1], 9.0 + 6.0 * 0.0099, 1e-12);  // not 3.0099^2
+  // The distance counts from where it was evaluated, not from the last value.
+  y_ = 3.0 - 0.0099;
+  ASSERT_TRUE(Evaluate(kept, true, true, &result));
+  EXPECT_EQ(inner_->count, 1);
+  EXPECT_EQ(result.by_y[1], 6.0);
+  y_ = 3.0 - 0.0101;
+  ASSERT_TRUE(Evaluate(kept, true, true, &result));
   EXPECT_EQ(inner_->count, 2);
+  EXPECT_DOUBLE_EQ(result.residuals[1], 2.9899 * 2.9899);
+}
+
+TEST_F(KeptCostTest, ABlockMovesNoFurtherThanItsBound) {
+  const KeptCost kept(inner_, {std::numeric_limits<double>::infinity(), {{0, 0.5}}});
+  Value result;
+  ASSERT_TRUE(Evaluate(kept, true, true, &result));
+  y_ = 30.0;
+  x_[0] = 1.4;
+  ASSERT_TRUE(Evaluate(kept, true, true, &result));
+  EXPECT_EQ(inner_->count, 1);
+  x_[1] = 2.4;  // sqrt(0.32) from the first
+  ASSERT_TRUE(Evaluate(kept, true, true, &result));
+  EXPECT_EQ(inner_->count, 2);
+}
+
+TEST_F(KeptCostTest, WithoutAValueNothingIsKept) {
+  Value result;
   ASSERT_TRUE(Evaluate(true, true, &result));
   y_ = -1.0;
   EXPECT_FALSE(Evaluate(true, true, &result));
+  EXPECT_EQ(kept_.number(), 0);
   y_ = std::numeric_limits<double>::quiet_NaN();  // differs from itself
   ASSERT_TRUE(Evaluate(true, true, &result));
   ASSERT_TRUE(Evaluate(true, true, &result));
-  EXPECT_EQ(inner_->count, 6);
+  EXPECT_EQ(inner_->count, 4);
 }
 
 }  // namespace
