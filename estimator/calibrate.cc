@@ -1,7 +1,6 @@
 #include "estimator/calibrate.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -21,20 +20,6 @@ namespace camgyro {
 namespace {
 
 constexpr int kMinPairsForUnseen = 60;  // below, setting frames aside costs more than it tells
-
-class StageClock {
- public:
-  explicit StageClock(std::vector<StageTime>* times) : times_(times) {}
-  void Finish(const std::string& stage) {
-    const auto now = std::chrono::steady_clock::now();
-    times_->push_back({stage, std::chrono::duration<double>(now - begin_).count()});
-    begin_ = now;
-  }
-
- private:
-  std::vector<StageTime>* times_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
 
 std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
   std::vector<CameraRotation> rotations;

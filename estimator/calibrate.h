@@ -10,6 +10,7 @@
 #include "core/calibration.h"
 #include "core/recording.h"
 #include "core/result.h"
+#include "estimator/stage_clock.h"
 #include "estimator/start/find_start.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/starting_point.h"
@@ -41,11 +42,6 @@ struct CalibrateOptions {
   // not count (the online estimates, 50 MB in an hour). But always what is told by this many.
   double most_bytes = 850e6;
   double least_refined_bytes = 150e6;
-};
-
-struct StageTime {
-  std::string stage;
-  double seconds = 0.0;
 };
 
 // What an effect that nobody has declared has in the error of each parameter: if it were known, the

@@ -84,7 +84,9 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   }
   std::printf("%s", DiagnosisText(diagnosis, attitudes).c_str());
   if (!FLAGS_quiet && diagnosis.before) {
-    std::printf("%s", Notes("doubt", diagnosis.result().doubts).c_str());
+    std::printf("%s%s",
+                TimeLine(diagnosis.times, run->tracking.seconds, recording->frames.size()).c_str(),
+                Notes("doubt", diagnosis.result().doubts).c_str());
   }
   if (!FLAGS_quiet) {
     std::printf("written    %s/diagnosis.yaml%s\n", files.folder().c_str(),

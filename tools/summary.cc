@@ -152,18 +152,18 @@ std::string QualityLine(const CalibrationReport& report, bool attitudes) {
   return line + "\n";
 }
 
-std::string TimeLine(const CalibrationReport& report, double tracking_s, size_t frames) {
+std::string TimeLine(const std::vector<StageTime>& times, double tracking_s, size_t frames) {
   std::string line = "time      ";
   if (tracking_s > 0.0) {
     line += Format(" tracking %.1f s (%.0f frames/s),", tracking_s,
                    static_cast<double>(frames) / tracking_s);
   }
-  for (const StageTime& time : report.times) {
+  for (const StageTime& time : times) {
     line += Format(" %s %.1f s", time.stage.c_str(), time.seconds);
     if (time.stage == "window" && time.seconds > 0.0) {
       line += Format(" (%.0f frames/s)", static_cast<double>(frames) / time.seconds);
     }
-    line += &time == &report.times.back() ? "" : ",";
+    line += &time == &times.back() ? "" : ",";
   }
   return line + "\n";
 }

@@ -32,7 +32,7 @@ std::string StartLine(const StartResult& start);
 std::string QualityLine(const CalibrationReport& report, bool attitudes);
 
 // Seconds per stage, and per frame of the online pass.
-std::string TimeLine(const CalibrationReport& report, double tracking_s, size_t frames);
+std::string TimeLine(const std::vector<StageTime>& times, double tracking_s, size_t frames);
 
 // "  note: ..." lines, wrapped; empty without notes.
 std::string Notes(const char* label, const std::vector<std::string>& notes);

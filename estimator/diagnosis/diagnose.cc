@@ -133,6 +133,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocals& rotations
     return diagnosis;
   }
   diagnosis.before = *before;
+  diagnosis.times = before->times;
 
   const CalibrationReport& report = *diagnosis.before;
   LoopInput input;
@@ -153,7 +154,9 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocals& rotations
   if (!(input.noise > 0.0)) {
     input.noise = recording.HasOnlyAttitudes() ? kFirstNoiseRad : kFirstNoisePx;
   }
+  StageClock clock(&diagnosis.times);
   const Result<Calibration> found = FindEffects(input, options, progress, &diagnosis);
+  clock.Finish("diagnosis");
   if (!found) {
     diagnosis.not_tested = found.error().message;
     return diagnosis;
@@ -161,6 +164,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocals& rotations
   AddReversedReadout(&diagnosis);
   if (found->effects && found->effects != report.calibration.effects) {
     CalibrateWith(*found, input, rotations_at, options, progress, &diagnosis);
+    clock.Finish("refinement with effects");
   }
   return diagnosis;
 }

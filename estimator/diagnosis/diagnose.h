@@ -81,6 +81,8 @@ struct Diagnosis {
   int fit_pairs = 0, choice_pairs = 0, report_pairs = 0;
   double block_s = 0.0;
   bool report_shares_tracks = false;
+  std::vector<StageTime>
+      times;  // of the calibration before, the loop, and that of all frames after
 
   const CalibrationReport& result() const { return after ? *after : *before; }
 };

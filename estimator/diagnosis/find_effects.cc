@@ -201,7 +201,6 @@ class Loop {
     // After the last round that may add, one that looks at what is left.
     bool added = true;
     for (int round = 0; round <= options_.max_rounds && added; ++round) {
-      Tell(round);
       DiagnosisRound result;
       added = Round(round, round < options_.max_rounds, &result);
       if (round == 0) out->maps_before = last_maps_;
@@ -257,8 +256,9 @@ class Loop {
     }
   }
 
-  void Tell(int round) const {
-    if (progress_) progress_("diagnosis", std::min(0.99, (round + 0.2) / options_.max_rounds));
+  // share: of the round. How many rounds follow, nobody knows: as many as there were, let us say.
+  void Tell(int round, double share) const {
+    if (progress_) progress_("diagnosis", 1.0 - std::pow(0.5, round + share));
   }
 
   RoundScores Score() const {
@@ -294,7 +294,9 @@ class Loop {
   // One round. True if an effect was added (fit_ has it then).
   bool Round(int round, bool may_add, DiagnosisRound* result) {
     const double noise = fit_.quality.noise_px;
+    Tell(round, 0.1);
     const RoundScores scores = Score();
+    Tell(round, 0.2);
     last_maps_ = Maps(scores.setup);
     result->before = result->after =
         Summarise(fits_.ScoresOf(fits_.shares().report, fit_.calibration, nullptr, noise), noise);
@@ -306,6 +308,7 @@ class Loop {
     AddWidened(scores, &all);
     AddFrameTimes(fits_, fit_, scores, &all);
     JudgeAndSort(options_.significance, &all);
+    Tell(round, 0.4);
 
     bool added = false;
     if (may_add && !all.empty() &&

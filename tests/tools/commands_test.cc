@@ -246,8 +246,10 @@ TEST_F(CommandsTest, DiagnoseWritesItsAccount) {
   Simulate(longer + "effects: {radial_distortion: {k1: -0.2, k2: 0.05}}\n", "a");
   const RunResult run = Run("diagnose a --out=result --threads=3");
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("1. radial_distortion"), HasSubstr("unseen frames: rms"),
-                             HasSubstr("what to do:"), HasSubstr("verdict    radial_distortion")));
+  EXPECT_THAT(run.out,
+              AllOf(HasSubstr("1. radial_distortion"), HasSubstr("unseen frames: rms"),
+                    HasSubstr("what to do:"), HasSubstr("verdict    radial_distortion"),
+                    HasSubstr(" s, diagnosis "), HasSubstr(" s, refinement with effects ")));
   const YAML::Node diagnosis = YAML::LoadFile(Path("result/diagnosis.yaml"));
   const YAML::Node round = diagnosis["rounds"][0];
   EXPECT_EQ(round["added"].as<std::string>(), "radial_distortion");
