@@ -1,5 +1,9 @@
 #include "tools/report/calibrate_report.h"
 
+#include <array>
+#include <functional>
+
+#include "core/parallel.h"
 #include "estimator/residual_table.h"
 #include "tools/report/frame_times_section.h"
 #include "tools/report/recording_sections.h"
@@ -33,9 +37,14 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
                                                        const RunInfo& run) {
   const bool attitudes = recording.HasOnlyAttitudes();
   const Calibration& calibration = report.calibration;
-  std::vector<ReportSection> sections = {
-      SummarySection(report, attitudes), MotionSection(recording, report, attitudes),
-      ConvergenceSection(report), DelaySection(report.start), RatesSection(recording, calibration)};
+  std::vector<ReportSection> sections = {SummarySection(report, attitudes),
+                                         MotionSection(recording, report, attitudes),
+                                         ConvergenceSection(report), DelaySection(report.start)};
+  // What takes long, beside each other.
+  ReportSection rates;
+  std::vector<TitledResiduals> fits = {{"at the start", {}}, {"calibrated", {}}};
+  Result<ReportSection> matches;
+  const auto make_rates = [&] { rates = RatesSection(recording, calibration); };
   if (!attitudes) {
     const EstimationInput input = OutlineOf(recording, SelectPairs(recording));
     std::vector<TimedPair> pairs = EvenlyChosen(input.pairs);
@@ -44,17 +53,26 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
     options.match_noise = recording.match_noise;
     options.residual = report.residual;
     const double noise_px = report.quality.noise_px;
-    const std::vector<TitledResiduals> fits = {
-        {"at the start",
-         ComputeResiduals(input, pairs, StartOf(recording, report.start), noise_px, options)},
-        {"calibrated", ComputeResiduals(input, pairs, calibration, noise_px, options)}};
+    const std::array<std::function<void()>, 3> parts = {
+        [&] {
+          fits[1].residuals = ComputeResiduals(input, pairs, calibration, noise_px, options);
+          matches = MatchesSection(recording, fits[1].residuals);
+        },
+        make_rates,
+        [&] {
+          fits[0].residuals =
+              ComputeResiduals(input, pairs, StartOf(recording, report.start), noise_px, options);
+        }};
+    ParallelFor(parts.size(), [&](size_t i) { parts.at(i)(); });
+    if (!matches) return tl::unexpected(matches.error());
+    sections.push_back(std::move(rates));
     sections.push_back(ResidualSection("residuals", "What is left unexplained", fits,
                                        calibration.width_px, calibration.height_px, noise_px));
-    Result<ReportSection> matches = MatchesSection(recording, fits.back().residuals);
-    if (!matches) return tl::unexpected(matches.error());
     sections.push_back(FitSection(report, attitudes));
     sections.push_back(std::move(*matches));
   } else {
+    make_rates();
+    sections.push_back(std::move(rates));
     sections.push_back(FitSection(report, attitudes));
   }
   if (!report.frame_times.empty()) sections.push_back(FrameTimesSection(recording, report));
