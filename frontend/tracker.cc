@@ -26,6 +26,10 @@ constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KL
 // corner.
 constexpr double kLeastVariance = 0.05;
 constexpr size_t kPointsForReference = 20;
+// Corners are looked for in every third frame, and where more than a tenth of the points have been
+// lost since: where there is nothing to be found, a cell is short of corners in every frame.
+constexpr int kFramesPerSearch = 3;
+constexpr double kShareKept = 0.9;
 
 // The patch, its derivatives and their interpolation.
 int Border(const TrackerOptions& options) {
@@ -81,13 +85,17 @@ std::vector<cv::Point2f> Corners(const cv::Mat& gray, const cv::Mat& mask,
     float strength;
     cv::Point place;
   };
-  std::vector<Corner> corners;
-  double strongest = 0.0;
-  cv::Mat strength, largest;
-  for (const cv::Rect& cell : cells) {
+  struct Cell {
+    std::vector<Corner> corners;
+    float strongest = 0.0F;
+  };
+  std::vector<Cell> found(cells.size());
+  const auto search = [&](size_t k) {
+    const cv::Rect& cell = cells[k];
     // The strength of a pixel depends on two around it, and it is compared with one.
     const cv::Rect wide = cv::Rect(cell.x - 3, cell.y - 3, cell.width + 6, cell.height + 6) &
                           cv::Rect({0, 0}, gray.size());
+    cv::Mat strength, largest;
     cv::cornerMinEigenVal(gray(wide), strength, kBlock);
     cv::dilate(strength, largest, cv::Mat());
     for (int y = cell.y; y < cell.y + cell.height; ++y) {
@@ -97,10 +105,20 @@ std::vector<cv::Point2f> Corners(const cv::Mat& gray, const cv::Mat& mask,
       for (int x = cell.x; x < cell.x + cell.width; ++x) {
         if (allowed[x] == 0) continue;
         const float value = here[x - wide.x];
-        strongest = std::max(strongest, static_cast<double>(value));
-        if (value > 0.0F && value == around[x - wide.x]) corners.push_back({value, {x, y}});
+        found[k].strongest = std::max(found[k].strongest, value);
+        if (value > 0.0F && value == around[x - wide.x])
+          found[k].corners.push_back({value, {x, y}});
       }
     }
+  };
+  cv::parallel_for_(cv::Range(0, static_cast<int>(cells.size())), [&](const cv::Range& range) {
+    for (int k = range.start; k < range.end; ++k) search(static_cast<size_t>(k));
+  });
+  std::vector<Corner> corners;
+  float strongest = 0.0F;
+  for (const Cell& of_cell : found) {
+    corners.insert(corners.end(), of_cell.corners.begin(), of_cell.corners.end());
+    strongest = std::max(strongest, of_cell.strongest);
   }
   const auto weakest = static_cast<float>(min_quality * strongest);
   corners.erase(std::remove_if(corners.begin(), corners.end(),
@@ -135,6 +153,7 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
     points_.clear();
     motions_.clear();
     noise_factors_.clear();
+    frames_since_search_ = kFramesPerSearch;
     size_ = gray.size();
   }
   if (gray.empty() || gray.type() != CV_8UC1) return {};
@@ -295,6 +314,16 @@ std::vector<Eigen::Vector3d> KltTracker::NoiseFactors(
 }
 
 void KltTracker::AddCorners(const cv::Mat& gray) {
+  if (++frames_since_search_ < kFramesPerSearch &&
+      static_cast<double>(points_.size()) >= kShareKept * static_cast<double>(points_at_search_)) {
+    return;
+  }
+  AddCornersNow(gray);
+  frames_since_search_ = 0;
+  points_at_search_ = points_.size();
+}
+
+void KltTracker::AddCornersNow(const cv::Mat& gray) {
   if (static_cast<int>(points_.size()) >= options_.max_points) return;
   const int grid = options_.grid;
   const int share = (options_.max_points + grid * grid - 1) / (grid * grid);
