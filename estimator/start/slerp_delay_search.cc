@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/rotation_chain.h"
 #include "core/so3.h"
@@ -95,7 +97,18 @@ Result<SlerpDelay> SlerpDelaySearch(const Recording& recording,
     q_first_frame.push_back((q_first_frame.back() * rotation.q_a_b).normalized());
   }
   const GyroRates gyro(recording.gyro);
-  const RotationChain chain(gyro.times_s, gyro.omega_gyro_rad_s.colwise() - bias_gyro_rad_s);
+  // What the search may look at, and a sample on either side.
+  const double reach_s = options.range_s + options.step_s;
+  const auto index = [&](auto sample) { return sample - gyro.times_s.begin(); };
+  const auto begin =
+      std::lower_bound(gyro.times_s.begin(), gyro.times_s.end(), times_s.front() - reach_s);
+  const auto end = std::upper_bound(begin, gyro.times_s.end(), times_s.back() + reach_s);
+  const auto size = static_cast<ptrdiff_t>(gyro.times_s.size());
+  const ptrdiff_t from = std::clamp<ptrdiff_t>(index(begin) - 1, 0, size - 2);
+  const ptrdiff_t to = std::clamp<ptrdiff_t>(index(end), from + 1, size - 1);
+  const RotationChain chain(
+      std::vector<double>(gyro.times_s.begin() + from, gyro.times_s.begin() + to + 1),
+      gyro.omega_gyro_rad_s.middleCols(from, to - from + 1).colwise() - bias_gyro_rad_s);
   const auto gyro_at = [&](double time_s) {
     return Eigen::Quaterniond(chain.At(time_s).R_ref_gyro);
   };

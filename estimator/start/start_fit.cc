@@ -3,6 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "core/robust_statistics.h"
@@ -34,10 +37,49 @@ struct Linearized {
   bool covered = false;
 };
 
+// The gyro's rotations over one stretch of samples after the other: those of an hour would take 220
+// MB at once, most of it for derivatives.
+class RotationsByStretch {
+ public:
+  RotationsByStretch(const GyroRates& gyro, const Eigen::Vector3d& bias_gyro_rad_s)
+      : gyro_(gyro), bias_gyro_rad_s_(bias_gyro_rad_s) {}
+
+  // Sees to it that a stretch covers both times. True if it is another one than before: states of
+  // that one have nothing to do with those to come.
+  bool Cover(double from_s, double to_s) {
+    if (chain_ && begin_s_ <= from_s && to_s <= end_s_) return false;
+    const std::vector<double>& times_s = gyro_.times_s;
+    const auto before = [&](double time_s) {  // the last sample that is not later; the first one
+      const auto after = std::upper_bound(times_s.begin(), times_s.end(), time_s);
+      return std::max<ptrdiff_t>(0, after - times_s.begin() - 1);
+    };
+    const auto size = static_cast<ptrdiff_t>(times_s.size());
+    const ptrdiff_t first = std::min(before(from_s), size - 2);
+    const ptrdiff_t last = std::min(size - 1, std::max(first + kSamples, before(to_s) + 1));
+    chain_.emplace(
+        std::vector<double>(times_s.begin() + first, times_s.begin() + last + 1),
+        gyro_.omega_gyro_rad_s.middleCols(first, last - first + 1).colwise() - bias_gyro_rad_s_);
+    // Outside of all samples, the rate of the first or the last is held.
+    constexpr double kForever = std::numeric_limits<double>::infinity();
+    begin_s_ = first == 0 ? -kForever : times_s[static_cast<size_t>(first)];
+    end_s_ = last == size - 1 ? kForever : times_s[static_cast<size_t>(last)];
+    return true;
+  }
+
+  RotationChain::State At(double time_s) const { return chain_->At(time_s); }
+
+ private:
+  static constexpr ptrdiff_t kSamples = 4096;  // 1 MB
+
+  const GyroRates& gyro_;
+  const Eigen::Vector3d bias_gyro_rad_s_;
+  std::optional<RotationChain> chain_;
+  double begin_s_ = 0.0, end_s_ = 0.0;
+};
+
 std::vector<Linearized> Linearize(const RateAlignment& alignment, const StartFit& at) {
-  const GyroRates& gyro = alignment.gyro();
   const CameraRates& camera = alignment.camera();
-  const RotationChain chain(gyro.times_s, gyro.omega_gyro_rad_s.colwise() - at.bias_gyro_rad_s);
+  RotationsByStretch rotations(alignment.gyro(), at.bias_gyro_rad_s);
   Eigen::Matrix3Xd unused;
   std::vector<char> covered;
   alignment.MeanGyroRates(at.lag_s, &unused, &covered);
@@ -49,9 +91,12 @@ std::vector<Linearized> Linearize(const RateAlignment& alignment, const StartFit
   for (int i = 0; i < camera.size(); ++i) {
     if (!covered[i]) continue;
     const int a = camera.frame_a[i], b = camera.frame_b[i];
+    const double time_a_s = camera.frame_times_s[a] + at.lag_s;
+    const double time_b_s = camera.frame_times_s[b] + at.lag_s;
+    if (rotations.Cover(time_a_s, time_b_s)) frame_of_b = -1;
     // Neighbouring pairs share a frame.
-    state_a = a == frame_of_b ? state_b : chain.At(camera.frame_times_s[a] + at.lag_s);
-    state_b = chain.At(camera.frame_times_s[b] + at.lag_s);
+    state_a = a == frame_of_b ? state_b : rotations.At(time_a_s);
+    state_b = rotations.At(time_b_s);
     frame_of_b = b;
     const double interval_s = camera.interval_s(i);
     const Eigen::Quaterniond q_a_b(
