@@ -32,8 +32,12 @@ STREAMS = {
     # 20 to 30 ms in each minute: a flight controller beside a camera. The gyro has to run on.
     "flight controller": ["effects.clock_skew.ppm=417", "effects.delay_wander.amplitude_s=0.00067",
                           "effects.delay_wander.period_s=60", "margin_s=%g"],
+    # The action camera's, with points that jump off their tracks by 20 px.
+    "wrong points": ["camera.delay_s=-0.0325", "effects.delay_wander.amplitude_s=0.0125",
+                     "effects.delay_wander.period_s=800", "tracks.outlier_fraction=0.15"],
 }
-COLOURS = {"constant": "#4d4d4d", "action camera": "#2166ac", "flight controller": "#b35806"}
+COLOURS = {"constant": "#4d4d4d", "action camera": "#2166ac", "flight controller": "#b35806",
+           "wrong points": "#762a83"}
 NEEDED_MS = 0.5
 SETTLED_S = 30.0  # errors count from then on
 
