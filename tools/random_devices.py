@@ -3,12 +3,13 @@
 class usually show and declared by nobody, and prints how the errors compare with sigma_total:
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
-                            [--motions NAME,...] [--clean] [--jobs N] [--camgyro PATH]
+                            [--motions NAME,...] [--clean] [--diagnose] [--jobs N] [--camgyro PATH]
 
 The sizes are those of the class in estimator/diagnosis/device_class.cc, read from that file. --clean
-draws nothing: for how often a doubt is said of a device that has no effect. Prints a table by
-parameter: part of the errors within 3 sigma_total, their rms in sigma_total, the median of
-sigma_total over the spread of the errors, and the NEES per parameter with the total covariance.
+draws nothing: for how often a doubt is said of a device that has no effect. --diagnose: what
+`diagnose` makes of the devices, instead of `calibrate`. Prints a table by parameter: part of the
+errors within 3 sigma_total, their rms in sigma_total, the median of sigma_total [px, s, rad/s, rad]
+and what that is of the spread of the errors, and the NEES per parameter with the total covariance.
 """
 import argparse
 import os
@@ -80,7 +81,8 @@ def run(options, seed):
             yaml.safe_dump(scenario, file)
         subprocess.run([options.camgyro, "simulate", folder + "/scenario.yaml", "--out", recording],
                        check=True, stdout=subprocess.DEVNULL)
-        done = subprocess.run([options.camgyro, "calibrate", recording, "--out", out,
+        command = "diagnose" if options.diagnose else "calibrate"
+        done = subprocess.run([options.camgyro, command, recording, "--out", out,
                                "--device", options.device],
                               capture_output=True, text=True, check=False)
         if not os.path.exists(out + "/calibration.yaml"):
@@ -122,6 +124,7 @@ def main():
     parser.add_argument("--duration", type=float, default=20.0)
     parser.add_argument("--motions", default="walking,running,handheld")
     parser.add_argument("--clean", action="store_true")
+    parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
     options = parser.parse_args()
@@ -140,17 +143,17 @@ def main():
         len(results), len(seeds), options.device, ", clean" if options.clean else "",
         sum(r["doubt"] for r in results)))
     print("| parameter | determined | within 3 sigma_total | rms error in sigma_total | "
-          "sigma_total / spread of errors | rms error in sigma of noise |")
-    print("| --- | --- | --- | --- | --- | --- |")
+          "sigma_total | sigma_total / spread of errors | rms error in sigma of noise |")
+    print("| --- " * 7 + "|")
     for i, name in enumerate(NAMES):
         of = used[:, i]
         if not of.any():
             continue
         spread = 1.4826 * np.median(np.abs(error[of, i]))
-        print("| %s | %d | %.1f %% | %.2f | %.2f | %.1f |" % (
+        print("| %s | %d | %.1f %% | %.2f | %.2g | %.2f | %.1f |" % (
             name, of.sum(), 100 * np.nanmean(np.abs(z[of, i]) < 3), np.sqrt(np.nanmean(z[of, i]**2)),
-            np.median(sigma[of, i]) / spread, np.sqrt(np.mean((error[of, i] / noise[of, i])**2))))
-    print("| all | %d | %.2f %% | %.2f | | |" % (used.sum(), 100 * np.mean(np.abs(z[used]) < 3),
+            np.median(sigma[of, i]), np.median(sigma[of, i]) / spread, np.sqrt(np.mean((error[of, i] / noise[of, i])**2))))
+    print("| all | %d | %.2f %% | %.2f | | | |" % (used.sum(), 100 * np.mean(np.abs(z[used]) < 3),
                                                np.sqrt(np.mean(z[used]**2))))
     nees = [r["error"] @ np.linalg.solve(r["total"], r["error"]) / len(NAMES) for r in results]
     print("NEES per parameter with the total covariance: mean %.2f, median %.2f" % (
