@@ -26,10 +26,6 @@ constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KL
 // corner.
 constexpr double kLeastVariance = 0.05;
 constexpr size_t kPointsForReference = 20;
-// Corners are looked for in every third frame, and where more than a tenth of the points have been
-// lost since: where there is nothing to be found, a cell is short of corners in every frame.
-constexpr int kFramesPerSearch = 3;
-constexpr double kShareKept = 0.9;
 
 // The patch, its derivatives and their interpolation.
 int Border(const TrackerOptions& options) {
@@ -153,7 +149,6 @@ std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredic
     points_.clear();
     motions_.clear();
     noise_factors_.clear();
-    frames_since_search_ = kFramesPerSearch;
     size_ = gray.size();
   }
   if (gray.empty() || gray.type() != CV_8UC1) return {};
@@ -314,16 +309,6 @@ std::vector<Eigen::Vector3d> KltTracker::NoiseFactors(
 }
 
 void KltTracker::AddCorners(const cv::Mat& gray) {
-  if (++frames_since_search_ < kFramesPerSearch &&
-      static_cast<double>(points_.size()) >= kShareKept * static_cast<double>(points_at_search_)) {
-    return;
-  }
-  AddCornersNow(gray);
-  frames_since_search_ = 0;
-  points_at_search_ = points_.size();
-}
-
-void KltTracker::AddCornersNow(const cv::Mat& gray) {
   if (static_cast<int>(points_.size()) >= options_.max_points) return;
   const int grid = options_.grid;
   const int share = (options_.max_points + grid * grid - 1) / (grid * grid);

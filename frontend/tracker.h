@@ -96,9 +96,7 @@ class KltTracker {
   void FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& pyramid,
                     const PointPredictor& predictor);
   std::vector<Eigen::Vector3d> NoiseFactors(const std::vector<Eigen::Matrix2d>& covariances);
-  // Where it is time to; always after the first frame.
   void AddCorners(const cv::Mat& gray);
-  void AddCornersNow(const cv::Mat& gray);
 
   TrackerOptions options_;
   cv::Size size_;
@@ -109,9 +107,7 @@ class KltTracker {
   std::vector<cv::Point2f> points_;
   std::vector<cv::Point2f> motions_;  // from the frame before, of the first ones of points_
   std::vector<Eigen::Vector3d> noise_factors_;
-  int frames_since_search_ = 0;  // for corners
-  size_t points_at_search_ = 0;  // after it
-  double reference_ = 0.0;       // variance of the typical corner in the first pair of frames
+  double reference_ = 0.0;  // variance of the typical corner in the first pair of frames
   int64_t next_id_ = 0;
 };
 
