@@ -63,6 +63,19 @@ std::optional<double> MinimumOf(const std::vector<SlerpDelayPoint>& curve, doubl
   return best->delay_s + (bend > 0.0 ? 0.5 * (before - after) / bend : 0.0) * step_s;
 }
 
+// The gyro's rotations from one time to another, and a sample on either side.
+RotationChain ChainOver(const GyroRates& gyro, double begin_s, double end_s,
+                        const Eigen::Vector3d& bias_gyro_rad_s) {
+  const std::vector<double>& times_s = gyro.times_s;
+  const auto begin = std::lower_bound(times_s.begin(), times_s.end(), begin_s);
+  const auto end = std::upper_bound(begin, times_s.end(), end_s);
+  const auto size = static_cast<ptrdiff_t>(times_s.size());
+  const ptrdiff_t first = std::clamp<ptrdiff_t>(begin - times_s.begin() - 1, 0, size - 2);
+  const ptrdiff_t last = std::clamp<ptrdiff_t>(end - times_s.begin(), first + 1, size - 1);
+  return {std::vector<double>(times_s.begin() + first, times_s.begin() + last + 1),
+          gyro.omega_gyro_rad_s.middleCols(first, last - first + 1).colwise() - bias_gyro_rad_s};
+}
+
 }  // namespace
 
 Result<SlerpDelay> SlerpDelaySearch(const Recording& recording,
@@ -97,18 +110,10 @@ Result<SlerpDelay> SlerpDelaySearch(const Recording& recording,
     q_first_frame.push_back((q_first_frame.back() * rotation.q_a_b).normalized());
   }
   const GyroRates gyro(recording.gyro);
-  // What the search may look at, and a sample on either side.
+  // What the search may look at.
   const double reach_s = options.range_s + options.step_s;
-  const auto index = [&](auto sample) { return sample - gyro.times_s.begin(); };
-  const auto begin =
-      std::lower_bound(gyro.times_s.begin(), gyro.times_s.end(), times_s.front() - reach_s);
-  const auto end = std::upper_bound(begin, gyro.times_s.end(), times_s.back() + reach_s);
-  const auto size = static_cast<ptrdiff_t>(gyro.times_s.size());
-  const ptrdiff_t from = std::clamp<ptrdiff_t>(index(begin) - 1, 0, size - 2);
-  const ptrdiff_t to = std::clamp<ptrdiff_t>(index(end), from + 1, size - 1);
-  const RotationChain chain(
-      std::vector<double>(gyro.times_s.begin() + from, gyro.times_s.begin() + to + 1),
-      gyro.omega_gyro_rad_s.middleCols(from, to - from + 1).colwise() - bias_gyro_rad_s);
+  const RotationChain chain =
+      ChainOver(gyro, times_s.front() - reach_s, times_s.back() + reach_s, bias_gyro_rad_s);
   const auto gyro_at = [&](double time_s) {
     return Eigen::Quaterniond(chain.At(time_s).R_ref_gyro);
   };
