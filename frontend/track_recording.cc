@@ -37,17 +37,19 @@ constexpr size_t kMostDecoded = 4;
 struct DecodedFrame {
   Result<bool> more = false;  // false: there is none
   cv::Mat gray;               // empty: not to be tracked
-  std::string complaint;      // about its size
+  KltTracker::Picture prepared;
+  std::string complaint;  // about its size
   bool shows_nothing = false;
 };
 
-DecodedFrame DecodeNext(FrameSource* source) {
+DecodedFrame DecodeNext(const KltTracker& tracker, FrameSource* source) {
   DecodedFrame frame;
   frame.more = source->NextOfAnySize(&frame.gray, &frame.complaint);
   if (frame.more && *frame.more && !frame.gray.empty() && ShowsNothing(frame.gray)) {
     frame.shows_nothing = true;
     frame.gray.release();
   }
+  frame.prepared = tracker.Prepare(frame.gray);
   return frame;
 }
 
@@ -95,9 +97,10 @@ Status FollowCorners(const TrackerOptions& options, const Calibration* calibrati
                      FrameSource* source, std::vector<std::vector<TrackedPoint>>* tracks,
                      UnusableFrames* unusable) {
   KltTracker tracker(options);
-  MadeAhead<DecodedFrame> decoded(kMostDecoded, [source] { return DecodeNext(source); });
+  MadeAhead<DecodedFrame> decoded(kMostDecoded,
+                                  [&tracker, source] { return DecodeNext(tracker, source); });
   for (size_t i = 0; i < recording.frames.size(); ++i) {
-    const DecodedFrame frame = decoded.Take();
+    DecodedFrame frame = decoded.Take();
     if (!frame.more) return tl::unexpected(frame.more.error());
     if (!*frame.more) break;
     if (frame.shows_nothing) {
@@ -110,7 +113,7 @@ Status FollowCorners(const TrackerOptions& options, const Calibration* calibrati
     std::optional<GyroRotation> rotation;
     if (i > 0) rotation = RotationBetween(recording, calibration, i - 1);
     if (rotation) predictor = [&](const Eigen::Vector2d& px) { return rotation->Predict(px); };
-    tracks->push_back(tracker.Add(frame.gray, predictor));
+    tracks->push_back(tracker.Add(std::move(frame.prepared), predictor));
     if (progress)
       progress(static_cast<double>(i + 1) / static_cast<double>(recording.frames.size()));
   }

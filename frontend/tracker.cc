@@ -26,6 +26,9 @@ constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KL
 // corner.
 constexpr double kLeastVariance = 0.05;
 constexpr size_t kPointsForReference = 20;
+// Frames for which a cell is left alone when no corner has been found in it: where there is nothing
+// to be found (a wall, the sky) a cell would be searched in every frame.
+constexpr int kRestOfBarrenCell = 2;
 
 // The patch, its derivatives and their interpolation.
 int Border(const TrackerOptions& options) {
@@ -142,22 +145,33 @@ int PyramidLevels(int window_px, double motion_px) {
 
 KltTracker::KltTracker(const TrackerOptions& options) : options_(options) {}
 
+KltTracker::Picture KltTracker::Prepare(const cv::Mat& gray) const {
+  if (gray.type() != CV_8UC1) return {};
+  Picture picture;
+  picture.gray = gray.clone();  // the caller may use its memory again
+  if (!gray.empty()) picture.pyramid = Pyramid(gray);
+  return picture;
+}
+
 std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredictor& predictor) {
-  if (gray.empty() || gray.type() != CV_8UC1 || gray.size() != size_) {
-    pyramid_.clear();
+  return Add(Prepare(gray), predictor);
+}
+
+std::vector<TrackedPoint> KltTracker::Add(Picture picture, const PointPredictor& predictor) {
+  if (picture.gray.empty() || picture.gray.size() != size_) {
+    previous_ = {};
     ids_.clear();
     points_.clear();
     motions_.clear();
     noise_factors_.clear();
-    size_ = gray.size();
+    rests_ = cv::Mat::zeros(options_.grid, options_.grid, CV_32S);
+    size_ = picture.gray.size();
   }
-  if (gray.empty() || gray.type() != CV_8UC1) return {};
+  if (picture.gray.empty()) return {};
 
-  std::vector<cv::Mat> pyramid = Pyramid(gray);
-  if (!points_.empty()) FollowPoints(gray, pyramid, predictor);
-  pyramid_ = std::move(pyramid);
-  gray.copyTo(gray_);  // the caller may use its memory again
-  AddCorners(gray);
+  if (!points_.empty()) FollowPoints(picture, predictor);
+  previous_ = std::move(picture);
+  AddCorners(previous_.gray);
 
   std::vector<TrackedPoint> tracked(points_.size());
   for (size_t i = 0; i < points_.size(); ++i) {
@@ -187,15 +201,15 @@ void KltTracker::SearchPoints(const std::vector<cv::Mat>& pyramid, int levels,
   }
   std::vector<uchar> found_ok, back_ok;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(pyramid_, pyramid, from, to, found_ok, error, window, levels, kStop,
-                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  cv::calcOpticalFlowPyrLK(previous_.pyramid, pyramid, from, to, found_ok, error, window, levels,
+                           kStop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
   // The way back starts from the same expected motion: it does not know where the way there began.
   std::vector<cv::Point2f> back;
   for (size_t k = 0; k < which.size(); ++k) {
     back.push_back(to[k] - (start[which[k]] - points_[which[k]]) * kHalf);
   }
-  cv::calcOpticalFlowPyrLK(pyramid, pyramid_, to, back, back_ok, error, window, levels, kStop,
-                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  cv::calcOpticalFlowPyrLK(pyramid, previous_.pyramid, to, back, back_ok, error, window, levels,
+                           kStop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
   for (size_t k = 0; k < which.size(); ++k) {
     const cv::Point2f point = to[k] * (1.0F / kHalf);
     search->points[which[k]] = point;
@@ -237,8 +251,7 @@ std::vector<cv::Point2f> KltTracker::Expected() const {
   return expected;
 }
 
-void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& pyramid,
-                              const PointPredictor& predictor) {
+void KltTracker::FollowPoints(const Picture& picture, const PointPredictor& predictor) {
   std::vector<cv::Point2f> start = points_, expected = Expected();
   if (predictor) {
     for (size_t i = 0; i < points_.size(); ++i) {
@@ -249,9 +262,9 @@ void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& p
     }
   }
   Search search{start, std::vector<bool>(start.size())};
-  SearchLost(pyramid, start, expected, &search);
-  if (const auto alike =
-          LikePrevious(gray, pyramid_, pyramid, points_, search.points, search.found)) {
+  SearchLost(picture.pyramid, start, expected, &search);
+  if (const auto alike = LikePrevious(picture.gray, previous_.pyramid, picture.pyramid, points_,
+                                      search.points, search.found)) {
     SearchLost(Pyramid(*alike), start, expected, &search);
   }
   // KLT has found where each patch went; how it turned and grew on the way decides the last
@@ -261,7 +274,8 @@ void KltTracker::FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& p
     for (auto i = static_cast<size_t>(range.start); i < static_cast<size_t>(range.end); ++i) {
       if (!search.found[i]) continue;
       const cv::Point2f &from = points_[i], &to = search.points[i];
-      aligned[i] = AlignPatch(gray_, {from.x, from.y}, gray, {to.x, to.y}, options_.aligned_px);
+      aligned[i] = AlignPatch(previous_.gray, {from.x, from.y}, picture.gray, {to.x, to.y},
+                              options_.aligned_px);
     }
   });
 
@@ -332,6 +346,12 @@ void KltTracker::AddCorners(const cv::Mat& gray) {
   for (int row = 0; row < grid; ++row) {
     for (int column = 0; column < grid; ++column) {
       if (count.at<int>(row, column) >= share) continue;
+      int& rest = rests_.at<int>(row, column);
+      if (rest > 0) {
+        --rest;
+        continue;
+      }
+      rest = kRestOfBarrenCell;  // unless a corner is found
       const cv::Point begin(column * size_.width / grid, row * size_.height / grid);
       const cv::Point end((column + 1) * size_.width / grid, (row + 1) * size_.height / grid);
       cells.emplace_back(begin, end);
@@ -348,6 +368,7 @@ void KltTracker::AddCorners(const cv::Mat& gray) {
     int& in_cell = count.at<int>(cell_of(corner));
     if (in_cell >= share || !far_from_new(corner)) continue;
     ++in_cell;
+    rests_.at<int>(cell_of(corner)) = 0;
     ids_.push_back(next_id_++);
     points_.push_back(corner);
     noise_factors_.emplace_back(1.0, 0.0, 1.0);

@@ -77,6 +77,15 @@ class KltTracker {
   // size than the one before ends every track (and the latter starts new ones).
   std::vector<TrackedPoint> Add(const cv::Mat& gray, const PointPredictor& predictor = nullptr);
 
+  // What can be made of a picture before the one before it has been added: as in
+  // Add(Prepare(gray)), but from another thread.
+  struct Picture {
+    cv::Mat gray;
+    std::vector<cv::Mat> pyramid;  // of its half and what is above, each with derivatives
+  };
+  Picture Prepare(const cv::Mat& gray) const;
+  std::vector<TrackedPoint> Add(Picture picture, const PointPredictor& predictor = nullptr);
+
  private:
   struct Search {
     std::vector<cv::Point2f> points;  // where each of points_ is now
@@ -93,16 +102,14 @@ class KltTracker {
   // there, from `start` in the whole pyramid.
   void SearchLost(const std::vector<cv::Mat>& pyramid, const std::vector<cv::Point2f>& start,
                   const std::vector<cv::Point2f>& expected, Search* search) const;
-  void FollowPoints(const cv::Mat& gray, const std::vector<cv::Mat>& pyramid,
-                    const PointPredictor& predictor);
+  void FollowPoints(const Picture& picture, const PointPredictor& predictor);
   std::vector<Eigen::Vector3d> NoiseFactors(const std::vector<Eigen::Matrix2d>& covariances);
   void AddCorners(const cv::Mat& gray);
 
   TrackerOptions options_;
   cv::Size size_;
-  // Of the previous frame: itself, and its half with what is above it, each with derivatives.
-  cv::Mat gray_;
-  std::vector<cv::Mat> pyramid_;
+  Picture previous_;
+  cv::Mat rests_;             // of each cell: frames for which it is not searched for corners
   std::vector<int64_t> ids_;  // ascending
   std::vector<cv::Point2f> points_;
   std::vector<cv::Point2f> motions_;  // from the frame before, of the first ones of points_
