@@ -74,7 +74,25 @@ struct FramePair {
 struct CameraRotation {
   int frame_a = 0, frame_b = 0;                               // indices into Recording::frames
   Eigen::Quaterniond q_a_b = Eigen::Quaterniond::Identity();  // vectors of camera b into camera a
-  double sigma_rad = 0.0;  // per axis, as far as the maker knows it
+  double sigma_rad = 0.0;    // per axis, as far as the maker knows it
+  double residual_px = 0.0;  // of the matches, after the fit: standard deviation; 0: not known
+};
+
+// How camera and gyro lie to each other, roughly: what a start knows, and enough to say how the
+// camera turned between two rows.
+struct RoughAlignment {
+  Eigen::Quaterniond q_gyro_cam = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d bias_gyro_rad_s = Eigen::Vector3d::Zero();
+  double delay_middle_row_s = 0.0;  // at the first gyro stamp
+  double clock_skew = 0.0;          // the delay grows by so much per second
+  double readout_s = 0.0;
+};
+
+// What rotations between pictures are asked for with: a focal length [px], and, where it is known,
+// how the gyro lies to the camera, which undoes the rolling shutter (two_view_rotation.h).
+struct RotationTrial {
+  double focal_px = 0.0;
+  std::optional<RoughAlignment> rough;
 };
 
 // Where the pixel noise of a match sits (docs/architecture.md, traps).

@@ -32,15 +32,16 @@ std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
 // The start with the field of view scanned; where the scan finds none that it can trust, at the
 // usual one that explains the gyro best, with the focal length left open. Errors: of the scan.
 Result<StartResult> StartFromPictures(const Recording& recording,
-                                      const CameraRotationsAtFocals& rotations_at,
+                                      const CameraRotationsAt& rotations_at,
                                       const CalibrateOptions& options) {
   const Result<StartResult> scanned =
       FindStartAndFocal(recording, rotations_at, options.start, options.focal_scan);
   if (scanned || scanned.error().kind != ErrorKind::kCannotEstimate) return scanned;
   Result<StartResult> best = scanned;
   for (const double focal : {0.55, 0.65, 0.8, 1.0}) {  // of the picture's width
-    const Result<StartResult> start = FindStart(
-        recording, rotations_at({focal * recording.camera.width_px}).front(), options.start);
+    const RotationTrial trial{focal * recording.camera.width_px, std::nullopt};
+    const Result<StartResult> start =
+        FindStart(recording, rotations_at(recording, {trial}).front(), options.start);
     if (start && (!best || start->explained > best->explained)) best = start;
   }
   if (best) {
@@ -79,7 +80,7 @@ class CalibrationJob {
     report_.residual = options.window.graph.residual;
   }
 
-  Result<CalibrationReport> Run(const CameraRotationsAtFocals& rotations_at) {
+  Result<CalibrationReport> Run(const CameraRotationsAt& rotations_at) {
     if (const Status found = Start(rotations_at); !found) return tl::unexpected(found.error());
     if (!attitudes_ && options_.online) {
       if (const Status done = Window(); !done) return tl::unexpected(done.error());
@@ -112,7 +113,7 @@ class CalibrationJob {
     if (progress_) progress_(stage, done);
   }
 
-  Status Start(const CameraRotationsAtFocals& rotations_at) {
+  Status Start(const CameraRotationsAt& rotations_at) {
     Tell("start", 0.0);
     const Result<StartResult> start =
         options_.given_start ? Result<StartResult>(*options_.given_start)
@@ -333,7 +334,7 @@ class CalibrationJob {
 }  // namespace
 
 Result<CalibrationReport> CalibrateRecording(const Recording& recording,
-                                             const CameraRotationsAtFocals& rotations_at,
+                                             const CameraRotationsAt& rotations_at,
                                              const CalibrateOptions& options,
                                              const Progress& progress) {
   return CalibrationJob(recording, options, progress).Run(rotations_at);

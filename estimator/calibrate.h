@@ -87,7 +87,7 @@ struct CalibrationReport {
 // from the pictures alone (frontend/two_view_rotation.h); not called for attitudes. Errors:
 // kCannotEstimate with the reason where the data do not determine a calibration.
 Result<CalibrationReport> CalibrateRecording(const Recording& recording,
-                                             const CameraRotationsAtFocals& rotations_at,
+                                             const CameraRotationsAt& rotations_at,
                                              const CalibrateOptions& options,
                                              const Progress& progress = nullptr);
 

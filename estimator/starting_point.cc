@@ -98,6 +98,10 @@ Result<StartingPoint> MakeStartingPoint(const Recording& recording, const StartR
   point.prior = MakePrior(recording, start);
   point.estimate = point.prior.mean;
   point.estimate.bias_gyro_rad_s = start.bias_gyro_rad_s;
+  if (start.readout && !recording.camera.readout_s) {
+    point.estimate.readout_s = start.readout->value_s;
+    point.estimate.delay_s = start.delay_middle_row_s - 0.5 * point.estimate.readout_s;
+  }
   if (start.focal && start.focal->determined) point.estimate.lens[kFocal] = start.focal->value_px;
   if (const Status added = AddStartEffects(recording, start, effects, residual, &point.estimate);
       !added) {

@@ -5,8 +5,11 @@
 #include <optional>
 #include <utility>
 
+#include "core/calibration.h"
 #include "core/lens.h"
 #include "core/parallel.h"
+#include "core/time.h"
+#include "frontend/gyro_rotation.h"
 #include "frontend/two_view_rotation.h"
 
 namespace camgyro {
@@ -15,10 +18,48 @@ namespace {
 constexpr double kPairS = 0.1;
 constexpr size_t kMinPairs = 30;  // the start asks for 20
 
-// A motion is followed from one focal length to the next if these are no further apart (log), and
-// searched anew at every fifth: a wrong one is not followed for long.
-constexpr double kFollowedLog = 0.1;
+// A motion is followed from one focal length to the next if these are no further apart (log).
+// Where no gyro says which minimum is the right one, it is searched anew at every fifth: a wrong
+// one is not followed for long.
+constexpr double kFollowedLog = 0.15;
 constexpr size_t kSearchEvery = 5;
+
+constexpr size_t kMatchesOfScan = 60;
+
+FramePair Thinned(const FramePair& pair, size_t most) {
+  FramePair thinned{pair.frame_a, pair.frame_b, {}};
+  for (const size_t i : SpreadIndices(pair.matches.size(), most)) {
+    thinned.matches.push_back(pair.matches[i]);
+  }
+  return thinned;
+}
+
+// The recording's declared lens, with this focal length.
+Calibration DeclaredCamera(const CameraGuess& camera, double focal_px) {
+  const Eigen::Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
+  Calibration c;
+  c.width_px = camera.width_px;
+  c.height_px = camera.height_px;
+  c.distortion_model = camera.distortion_model;
+  c.lens = MakePinhole(focal_px, camera.principal_px.value_or(centre), camera.aspect_ratio);
+  for (size_t i = 0; i < std::min<size_t>(camera.distortion.size(), 4); ++i) {
+    c.lens[FirstCoefficient(camera.distortion_model) + static_cast<int>(i)] = camera.distortion[i];
+  }
+  return c;
+}
+
+// How the gyro turned from one frame to the other. Nothing where it has a hole.
+std::optional<GyroRotation> RoughRotation(const Recording& recording, const FramePair& pair,
+                                          const RoughAlignment& rough, Calibration camera) {
+  const int64_t stamp_a_ns = recording.frames[static_cast<size_t>(pair.frame_a)].stamp_ns;
+  const int64_t stamp_b_ns = recording.frames[static_cast<size_t>(pair.frame_b)].stamp_ns;
+  camera.q_gyro_cam = rough.q_gyro_cam;
+  camera.bias_gyro_rad_s = rough.bias_gyro_rad_s;
+  camera.readout_s = rough.readout_s;
+  camera.delay_s = rough.delay_middle_row_s - 0.5 * rough.readout_s +
+                   rough.clock_skew * SecondsSince(recording.gyro.front().stamp_ns, stamp_a_ns);
+  return GyroRotation::Between(recording.gyro, camera, stamp_a_ns, stamp_b_ns);
+}
 
 }  // namespace
 
@@ -52,32 +93,32 @@ std::vector<size_t> SpreadIndices(size_t count, size_t most) {
   return spread;
 }
 
-std::vector<std::vector<CameraRotation>> CameraRotationsOf(const std::vector<FramePair>& pairs,
-                                                           const CameraGuess& camera,
-                                                           const std::vector<double>& focals_px) {
-  const Eigen::Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
-  const Lens& model = GetLens(camera.distortion_model);
-  std::vector<LensParameters> lenses;
-  for (const double focal_px : focals_px) {
-    LensParameters& lens = lenses.emplace_back(
-        MakePinhole(focal_px, camera.principal_px.value_or(centre), camera.aspect_ratio));
-    for (size_t i = 0; i < std::min<size_t>(camera.distortion.size(), 4); ++i) {
-      lens[FirstCoefficient(camera.distortion_model) + static_cast<int>(i)] = camera.distortion[i];
-    }
+std::vector<std::vector<CameraRotation>> CameraRotationsOf(
+    const Recording& recording, const std::vector<FramePair>& pairs,
+    const std::vector<RotationTrial>& trials) {
+  std::vector<Calibration> cameras;
+  for (const RotationTrial& trial : trials) {
+    cameras.push_back(DeclaredCamera(recording.camera, trial.focal_px));
   }
+  const Lens& model = GetLens(recording.camera.distortion_model);
+  const size_t most = trials.size() > 1 ? kMatchesOfScan : std::numeric_limits<size_t>::max();
   std::vector<std::vector<std::optional<CameraRotation>>> found(pairs.size());
   ParallelFor(pairs.size(), [&](size_t i) {
+    const FramePair pair = Thinned(pairs[i], most);
     std::optional<TwoViewMotion> motion;
-    for (size_t k = 0; k < lenses.size(); ++k) {
+    for (size_t k = 0; k < trials.size(); ++k) {
+      std::optional<GyroRotation> gyro;
+      if (trials[k].rough) gyro = RoughRotation(recording, pair, *trials[k].rough, cameras[k]);
       const bool is_near =
-          k > 0 && std::abs(std::log(focals_px[k] / focals_px[k - 1])) < kFollowedLog;
-      if (!is_near || k % kSearchEvery == 0) motion.reset();
-      found[i].push_back(EstimateCameraRotation(pairs[i], model, lenses[k], {}, &motion));
+          k > 0 && std::abs(std::log(trials[k].focal_px / trials[k - 1].focal_px)) < kFollowedLog;
+      if (!is_near || (!gyro && k % kSearchEvery == 0)) motion.reset();
+      found[i].push_back(gyro ? EstimateCameraRotation(pair, *gyro)
+                              : EstimateCameraRotation(pair, model, cameras[k].lens, {}, &motion));
     }
   });
-  std::vector<std::vector<CameraRotation>> rotations(lenses.size());
+  std::vector<std::vector<CameraRotation>> rotations(trials.size());
   for (const auto& of_pair : found) {
-    for (size_t k = 0; k < lenses.size(); ++k) {
+    for (size_t k = 0; k < trials.size(); ++k) {
       if (of_pair[k]) rotations[k].push_back(*of_pair[k]);
     }
   }

@@ -27,13 +27,14 @@ std::vector<FramePair> PairsForRotations(const Recording& recording,
 // At most `most` of the numbers below `count`, evenly spread.
 std::vector<size_t> SpreadIndices(size_t count, size_t most);
 
-// EstimateCameraRotation (two_view_rotation.h) of each pair with the recording's declared lens (the
-// centre of the picture where it declares no principal point), and each of these focal lengths
-// [px]. Pairs whose rotation cannot be found are left out. Focal lengths in ascending order, some
-// per cent apart, share most of the work.
-std::vector<std::vector<CameraRotation>> CameraRotationsOf(const std::vector<FramePair>& pairs,
-                                                           const CameraGuess& camera,
-                                                           const std::vector<double>& focals_px);
+// EstimateCameraRotation (two_view_rotation.h) of each pair in each trial, with the recording's
+// declared lens (the centre of the picture where it declares no principal point), for every trial
+// those pairs whose rotation can be found. Trials some per cent of the focal length apart, one
+// after the other, share most of the work, and where there are several they take at most 100
+// matches of each pair: they are for finding out which one fits.
+std::vector<std::vector<CameraRotation>> CameraRotationsOf(
+    const Recording& recording, const std::vector<FramePair>& pairs,
+    const std::vector<RotationTrial>& trials);
 
 }  // namespace camgyro
 

@@ -98,4 +98,33 @@ std::optional<RotatedMatch> GyroRotation::Rotate(const Match& match) const {
   return RotatedMatch{a.ray_ref, b.ray_ref, a.J_ray_px, b.J_ray_px};
 }
 
+Eigen::Matrix3d GyroRotation::MiddleRow(double frame_time_s) const {
+  const double height_px = calibration_.height_px;
+  const double time_s =
+      RowTimeGyroS(frame_time_s, ShutterOf(calibration_), 0.5 * height_px, height_px);
+  return chain_.At(time_s).R_ref_gyro * R_gyro_cam_;
+}
+
+Eigen::Matrix3d GyroRotation::BetweenMiddleRows() const {
+  return MiddleRow(0.0).transpose() * MiddleRow(interval_s_);
+}
+
+std::optional<RotatedMatch> GyroRotation::Unroll(const Match& match) const {
+  std::optional<RotatedMatch> seen = Rotate(match);
+  if (!seen) return std::nullopt;
+  const auto turn = [this](double frame_time_s, Eigen::Vector3d* ray,
+                           Eigen::Matrix<double, 3, 2>* J_ray_px) {
+    const Eigen::Matrix3d R_cam_ref = MiddleRow(frame_time_s).transpose();
+    const Eigen::Vector3d turned = R_cam_ref * *ray;
+    const Eigen::Matrix<double, 3, 2> J_turned_px = R_cam_ref * *J_ray_px;
+    *ray = turned / turned.z();
+    *J_ray_px = (J_turned_px - *ray * J_turned_px.row(2)) / turned.z();
+    return turned.z() > 0.0;
+  };
+  if (!turn(0.0, &seen->a, &seen->J_a_px) || !turn(interval_s_, &seen->b, &seen->J_b_px)) {
+    return std::nullopt;
+  }
+  return seen;
+}
+
 }  // namespace camgyro

@@ -30,8 +30,17 @@ class GyroRotation {
   // where the lens has no ray.
   std::optional<RotatedMatch> Rotate(const Match& match) const;
 
+  // Both rays as a global shutter would have seen them, had the camera only turned while its rows
+  // were read: each in the camera's frame at the time of its middle row, third component 1. Nothing
+  // where the lens has no ray.
+  std::optional<RotatedMatch> Unroll(const Match& match) const;
+  // R_a_b between these two frames.
+  Eigen::Matrix3d BetweenMiddleRows() const;
+
  private:
   GyroRotation(const Calibration& calibration, RotationChain chain, double interval_s);
+
+  Eigen::Matrix3d MiddleRow(double frame_time_s) const;  // R_ref_cam at its time
 
   Calibration calibration_;
   RotationChain chain_;  // seconds from frame a's stamp

@@ -28,10 +28,10 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
   return summary;
 }
 
-CameraRotationsAtFocals RotationsFrom(const Recording& recording, size_t max_pairs) {
-  return [pairs = PairsForRotations(recording, max_pairs),
-          camera = recording.camera](const std::vector<double>& focals_px) {
-    return CameraRotationsOf(pairs, camera, focals_px);
+CameraRotationsAt RotationsFrom(const Recording& recording, size_t max_pairs) {
+  return [pairs = PairsForRotations(recording, max_pairs)](
+             const Recording& now, const std::vector<RotationTrial>& trials) {
+    return CameraRotationsOf(now, pairs, trials);
   };
 }
 
@@ -40,7 +40,7 @@ Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEst
                                       Recording* recording) {
   const Result<TrackingSummary> tracking = EnsureImageMotion(progress, recording);
   if (!tracking) return tl::unexpected(tracking.error());
-  const CameraRotationsAtFocals rotations_at = RotationsFrom(*recording);
+  const CameraRotationsAt rotations_at = RotationsFrom(*recording);
   Result<CalibrationReport> report =
       estimator == OnlineEstimator::kPaperEkf
           ? CalibrateWithEkf(*recording, rotations_at, options, {})

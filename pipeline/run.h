@@ -23,9 +23,9 @@ namespace camgyro {
 // motion. Where nothing had to be tracked, its time is zero.
 Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* recording);
 
-// Rotations between frames at a trial focal length, from at most `max_pairs` pairs of frames. The
-// function holds a copy of them: the recording may go.
-CameraRotationsAtFocals RotationsFrom(const Recording& recording, size_t max_pairs = 400);
+// Rotations between frames in some trials, from at most `max_pairs` pairs of frames. The function
+// holds a copy of them: the recording may go, or come with other gyro samples.
+CameraRotationsAt RotationsFrom(const Recording& recording, size_t max_pairs = 400);
 
 // Which estimator goes along with the frames: ours, or the filter of Jia & Evans as published,
 // without refinement, for comparison.

@@ -95,9 +95,9 @@ Result<DelayReport> FindDelay(const Recording& recording, ProgressBar* bar) {
   }
   if (!start) return tl::unexpected(start.error());
   if (start->focal) {
-    rotations =
-        CameraRotationsOf(PairsForRotations(recording), recording.camera, {start->focal->value_px})
-            .front();
+    const RotationTrial trial{start->focal->value_px,
+                              RoughlyAligned(*start, start->readout->value_s)};
+    rotations = CameraRotationsOf(recording, PairsForRotations(recording), {trial}).front();
   }
   DelayReport report;
   report.start = std::move(*start);
@@ -122,6 +122,10 @@ std::string SlerpCsv(const SlerpDelay& slerp) {
     out << point.delay_s << "," << point.mean_square_rad2 << "\n";
   }
   return out.str();
+}
+
+std::string Scanned(bool determined, double value, double sigma, const char* unit) {
+  return Format(determined ? "%.1f ± %.1f %s" : "%.1f (± %.1f) %s", value, sigma, unit);
 }
 
 Status RunDelay(const std::vector<std::string>& arguments) {
@@ -161,6 +165,14 @@ Status RunDelay(const std::vector<std::string>& arguments) {
   std::printf("mounting   %s, turned by %.1f deg\n",
               DescribePermutation(start.nearest_permutation).c_str(),
               57.29577951308232 * start.permutation_angle_rad);
+  if (start.focal && start.readout) {
+    std::printf("camera     for a start: focal length %s, readout %s\n",
+                Scanned(start.focal->determined, start.focal->value_px, start.focal->sigma_px, "px")
+                    .c_str(),
+                Scanned(start.readout->determined, 1e3 * start.readout->value_s,
+                        1e3 * start.readout->sigma_s, "ms")
+                    .c_str());
+  }
   std::printf(
       "trust      the camera explains %.0f %% of the gyro's motion; the next best delay, "
       "%.3f s,\n           leaves %.0f times as much unexplained\n",

@@ -220,10 +220,10 @@ std::optional<std::string> FindElectronicStabilisation(
   return std::nullopt;
 }
 
-std::optional<DataFault> RepairGyro(const CameraRotationsAtFocals& rotations_at,
+std::optional<DataFault> RepairGyro(const CameraRotationsAt& rotations_at,
                                     const StartOptions& options, Recording* recording) {
   const double focal = FocalToBeginWith(recording->camera);
-  const std::vector<CameraRotation> rotations = rotations_at({focal}).front();
+  const std::vector<CameraRotation> rotations = rotations_at(*recording, {{focal, {}}}).front();
   struct Repair {
     double scale;
     bool mirror;

@@ -39,7 +39,7 @@ std::optional<std::string> FindElectronicStabilisation(
 // A recording whose start was refused: does it fit with the gyro in another unit (deg/s), or with
 // one axis mirrored (a wrong order of axes is a mirror, too)? Repairs the gyro and says what it
 // was.
-std::optional<DataFault> RepairGyro(const CameraRotationsAtFocals& rotations_at,
+std::optional<DataFault> RepairGyro(const CameraRotationsAt& rotations_at,
                                     const StartOptions& options, Recording* recording);
 
 }  // namespace camgyro

@@ -11,7 +11,7 @@ namespace {
 
 // Rotations of the camera, whatever the recording has.
 std::vector<CameraRotation> CameraRotationsIn(const Recording& recording,
-                                              const CameraRotationsAtFocals& rotations_at) {
+                                              const CameraRotationsAt& rotations_at) {
   if (recording.HasOnlyAttitudes()) {
     std::vector<CameraRotation> rotations;
     for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
@@ -19,7 +19,7 @@ std::vector<CameraRotation> CameraRotationsIn(const Recording& recording,
     }
     return rotations;
   }
-  return rotations_at({FocalToBeginWith(recording.camera)}).front();
+  return rotations_at(recording, {{FocalToBeginWith(recording.camera), {}}}).front();
 }
 
 // Part of a progress: a stage's share of the whole.
@@ -56,7 +56,7 @@ void AddFoundAtStart(const CalibrationReport& report, Diagnosis* diagnosis) {
 
 // As calibrate has it. If that is refused: a gyro in the wrong unit or with mirrored axes, which is
 // repaired, or a picture without the fast rotation?
-Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAtFocals& rotations_at,
+Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAt& rotations_at,
                                             const CalibrateOptions& options,
                                             const Progress& progress, Recording* recording,
                                             std::vector<DataFault>* faults) {
@@ -95,7 +95,7 @@ void AddReversedReadout(Diagnosis* diagnosis) {
 
 // All frames with the effects that were found.
 void CalibrateWith(const Calibration& found, const LoopInput& input,
-                   const CameraRotationsAtFocals& rotations_at, const DiagnoseOptions& options,
+                   const CameraRotationsAt& rotations_at, const DiagnoseOptions& options,
                    const Progress& progress, Diagnosis* diagnosis) {
   const Recording& recording = *input.recording;
   CalibrateOptions with = options.calibrate;
@@ -119,7 +119,7 @@ void CalibrateWith(const Calibration& found, const LoopInput& input,
 
 }  // namespace
 
-Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocals& rotations_at,
+Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
                    const DiagnoseOptions& options, const Progress& progress) {
   Diagnosis diagnosis;
   diagnosis.faults = FindDataFaults(recording);

@@ -90,7 +90,7 @@ struct Diagnosis {
 // Never an error for data that are sound: a recording that cannot be calibrated has `refusal` set,
 // and `effects` say why where that can be said. The recording may be repaired (gyro_unit, ...): the
 // diagnosis says so.
-Diagnosis Diagnose(Recording recording, const CameraRotationsAtFocals& rotations_at,
+Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
                    const DiagnoseOptions& options, const Progress& progress = nullptr);
 
 // The loop alone, from a calibration as the plain model has it: fills rounds, effects, maps and

@@ -29,7 +29,7 @@ EkfRun RunEkf(const EstimationInput& input, const std::vector<Frame>& frames, co
 }
 
 Result<CalibrationReport> CalibrateWithEkf(const Recording& recording,
-                                           const CameraRotationsAtFocals& rotations_at,
+                                           const CameraRotationsAt& rotations_at,
                                            const CalibrateOptions& options,
                                            const EkfOptions& ekf_options) {
   if (recording.HasOnlyAttitudes()) {

@@ -24,7 +24,7 @@ EkfRun RunEkf(const EstimationInput& input, const std::vector<Frame>& frames, co
 // scan, of q_c from the nearest permutation of the axes. No refinement. The recording needs image
 // motion. Errors: as CalibrateRecording; kCannotEstimate also if no pair could be used.
 Result<CalibrationReport> CalibrateWithEkf(const Recording& recording,
-                                           const CameraRotationsAtFocals& rotations_at,
+                                           const CameraRotationsAt& rotations_at,
                                            const CalibrateOptions& options,
                                            const EkfOptions& ekf_options);
 

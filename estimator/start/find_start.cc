@@ -144,7 +144,8 @@ void SetClockRate(const ClockRate& rate, double lag_s, double offset_s, StartRes
   // t_gyro = t_camera (1 + skew) + lag, both from their first stamps, is t_camera + delay there.
   result->delay_middle_row_s = lag_s / (1.0 + rate.skew) + offset_s;
   result->notes.push_back(
-      "the gyro's clock runs " + Format("%.2f %%", 100.0 * std::abs(rate.skew)) +
+      "the gyro's clock runs " +
+      Format("%.3f ± %.3f %%", 100.0 * std::abs(rate.skew), 100.0 * rate.sigma) +
       (rate.skew > 0.0 ? " fast" : " slow") + " by the camera's: the delay moves by " +
       Format("%.1f ms", 1e3 * std::abs(rate.skew)) +
       " per second, and clock_skew is part of the model");
@@ -221,6 +222,11 @@ void SearchAllAlignments(const Streams& s, const StartOptions& options, LagSearc
 }
 
 }  // namespace
+
+RoughAlignment RoughlyAligned(const StartResult& start, double readout_s) {
+  return {start.q_gyro_cam, start.bias_gyro_rad_s, start.delay_middle_row_s, start.clock_skew,
+          readout_s};
+}
 
 Result<StartResult> FindStart(const Recording& recording,
                               const std::vector<CameraRotation>& rotations,

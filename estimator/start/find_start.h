@@ -46,6 +46,13 @@ struct StartFocal {
   std::vector<FocalResidual> curve;
 };
 
+struct StartReadout {
+  double value_s = 0.0;
+  double sigma_s = 0.0;
+  // Sigma below 15 % of the frame interval and a distinct minimum; else value_s is what is usual.
+  bool determined = false;
+};
+
 struct StartResult {
   // t_gyro = t_camera + delay, for the instant that the camera rotations belong to. Rotations of
   // whole pictures of a rolling shutter belong to the middle row: this is t_d + t_r / 2 then.
@@ -83,9 +90,12 @@ struct StartResult {
   double gyro_rms_rad_s = 0.0;  // of the intervals' mean rates about their mean, all axes together
   int pairs = 0;
 
-  std::optional<StartFocal> focal;  // set by FindStartAndFocal (focal_scan.h)
+  std::optional<StartFocal> focal;      // set by FindStartAndFocal (focal_scan.h)
+  std::optional<StartReadout> readout;  // the same; a declared one has no sigma
   std::vector<std::string> notes;
 };
+
+RoughAlignment RoughlyAligned(const StartResult& start, double readout_s);
 
 // Finds the start from camera rotations between frames (from pictures or attitudes). Searches
 // +-search_s around the recording's delay_s (a guess only); if nothing there fits, as with clocks

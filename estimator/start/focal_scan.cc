@@ -3,7 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,25 +27,33 @@ constexpr double kDistinctLog = 0.22;    // 25 %
 constexpr double kMaxRunnerUp = 0.8;     // a wrong lens moves shallow minima far
 constexpr double kModelLog = 0.02;       // rotations of pictures neglect rolling shutter and lens
 constexpr double kUnknownLog = 0.3;      // what is known of any lens
+// Parts of the frame interval: what is taken where nothing tells, and its sigma; the largest sigma
+// of what is told.
+constexpr double kUsualReadout = 0.5;
+constexpr double kUnknownReadout = 0.3;
+constexpr double kDeterminedReadout = 0.15;
+constexpr double kModelReadout = 0.05;   // the loss is no parabola: 1 ms rms in simulated walks
+constexpr double kLeastMatches = 15.0;   // of a pair that has a rotation
 constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
 
 struct ScanPoint {
-  double log_focal = 0.0;
+  double x = 0.0;  // what is scanned: log of the focal length, or readout time / frame interval
+  RotationTrial trial;
   std::vector<CameraRotation> rotations;
-  // Squared residuals of pan and tilt of each pair [(px/s)^2], and the pair's block.
+  // Of each pair: squared residuals, in the units of the noise, and its block.
   std::vector<double> squares;
   std::vector<int> blocks;
-  double noise_px_s = 0.0;
+  double noise = 0.0;
   double gyro_power = 0.0;
-  // Truncated losses per block, and the total.
+  // Truncated losses per block.
   Eigen::VectorXd loss;
 };
 
-// Residuals at one focal length, with lag, orientation and bias fitted to it. In the image (angle
-// times focal length), where the camera's noise does not depend on the focal length assumed: in
-// angles, a longer focal length would always shrink it, and win.
-void Measure(const Recording& recording, const StartResult& near, double lag_s,
-             const StartOptions& options, ScanPoint* point) {
+// Residuals of pan and tilt at one point [px/s], with lag, orientation and bias fitted to it. In
+// the image (angle times focal length), where the camera's noise does not depend on the focal
+// length assumed: in angles, a longer focal length would always shrink it, and win.
+void MeasureAngles(const Recording& recording, const StartResult& near, double lag_s,
+                   const StartOptions& options, ScanPoint* point) {
   GyroRates gyro(recording.gyro);
   auto camera = MakeCameraRates(recording, point->rotations, gyro);
   if (!camera || camera->size() < options.min_pairs) return;
@@ -56,19 +64,29 @@ void Measure(const Recording& recording, const StartResult& near, double lag_s,
   alignment.MeanGyroRates(fit.lag_s, &rates, &covered);
   const CameraRates& cam = alignment.camera();
   const int frames = static_cast<int>(recording.frames.size());
-  const double focal_px = std::exp(point->log_focal);
   std::vector<double> norms;
   for (int i = 0; i < cam.size(); ++i) {
     if (!covered[i]) continue;
     const Eigen::Vector3d gyro_rate_cam =
         fit.q_gyro_cam.conjugate() * (rates.col(i) - fit.bias_gyro_rad_s);
-    const double scale = focal_px * std::sqrt(cam.weight[i]);
+    const double scale = point->trial.focal_px * std::sqrt(cam.weight[i]);
     norms.push_back(scale * (cam.omega_cam_rad_s.col(i) - gyro_rate_cam).head<2>().norm());
     point->squares.push_back(norms.back() * norms.back());
     point->blocks.push_back(cam.frame_a[i] * kBlocks / frames);
     point->gyro_power += cam.weight[i] * gyro_rate_cam.head<2>().squaredNorm();
   }
-  point->noise_px_s = MedianInPlace(&norms) / kMedianNorm2;
+  point->noise = MedianInPlace(&norms) / kMedianNorm2;
+}
+
+// What the matches of each pair leave at one point [px], whatever its rotation.
+void MeasureMatches(const Recording& recording, ScanPoint* point) {
+  const int frames = static_cast<int>(recording.frames.size());
+  for (const CameraRotation& rotation : point->rotations) {
+    point->squares.push_back(rotation.residual_px * rotation.residual_px);
+    point->blocks.push_back(rotation.frame_a * kBlocks / frames);
+  }
+  std::vector<double> squares = point->squares;
+  if (!squares.empty()) point->noise = std::sqrt(MedianInPlace(&squares));
 }
 
 // Parabola y = c0 + c1 x + c2 x^2 through points (least squares); rows of coefficients per column
@@ -79,87 +97,145 @@ Eigen::MatrixXd FitParabola(const Eigen::VectorXd& x, const Eigen::MatrixXd& y) 
   return powers.colPivHouseholderQr().solve(y);
 }
 
-// The scan over focal lengths, step by step.
+// The losses along what is scanned, by ascending x.
+class ScanCurve {
+ public:
+  // spacing: between the points, of which there are two more half of it around the best one.
+  // means_of: each square is the mean of at least so many.
+  ScanCurve(std::vector<ScanPoint> points, double spacing, double means_of)
+      : points_(std::move(points)), spacing_(spacing), means_of_(means_of) {
+    std::sort(points_.begin(), points_.end(),
+              [](const ScanPoint& a, const ScanPoint& b) { return a.x < b.x; });
+    Truncate();
+  }
+
+  const std::vector<ScanPoint>& points() const { return points_; }
+  double gyro_power() const { return gyro_power_; }
+
+  const ScanPoint& Best() const {
+    return *std::min_element(
+        points_.begin(), points_.end(),
+        [](const ScanPoint& a, const ScanPoint& b) { return a.loss.sum() < b.loss.sum(); });
+  }
+
+  // Loss of the best point / least loss further than `distance` away from it.
+  double RunnerUpRatio(double distance) const {
+    const ScanPoint& best = Best();
+    double second = -1.0;
+    for (const ScanPoint& point : points_) {
+      if (std::abs(point.x - best.x) <= distance) continue;
+      if (second < 0.0 || point.loss.sum() < second) second = point.loss.sum();
+    }
+    return second > 0.0 ? best.loss.sum() / second : 1.0;
+  }
+
+  // Of the parabola through the points around the best one: x, and its standard deviation.
+  std::pair<double, double> Minimum() const {
+    const ScanPoint& best = Best();
+    std::vector<const ScanPoint*> close;
+    for (const ScanPoint& point : points_) {
+      if (std::abs(point.x - best.x) < 1.1 * spacing_) close.push_back(&point);
+    }
+    Eigen::VectorXd x(static_cast<Eigen::Index>(close.size()));
+    Eigen::MatrixXd y(static_cast<Eigen::Index>(close.size()), kBlocks);
+    for (size_t k = 0; k < close.size(); ++k) {
+      x[static_cast<Eigen::Index>(k)] = close[k]->x - best.x;
+      y.row(static_cast<Eigen::Index>(k)) = close[k]->loss.transpose();
+    }
+    const Eigen::MatrixXd parabolas = FitParabola(x, y);
+    const Eigen::Vector3d sum = parabolas.rowwise().sum();
+    const bool inside = &best != &points_.front() && &best != &points_.back();
+    if (!inside || !(sum[2] > 0.0)) return {best.x, 1.0};
+    const double shift = std::clamp(-0.5 * sum[1] / sum[2], -spacing_, spacing_);
+    const double classical = noise_ * noise_ / (means_of_ * sum[2]);
+    const double scores = (parabolas.row(1) + 2.0 * shift * parabolas.row(2)).squaredNorm() *
+                          kBlocks / (kBlocks - 1.0);
+    const double sandwich = scores / (4.0 * sum[2] * sum[2]);
+    return {best.x + shift, std::min(1.0, std::sqrt(std::max(classical, sandwich)))};
+  }
+
+ private:
+  // Losses, bounded by the least noise of any point.
+  void Truncate() {
+    size_t pairs = 1;  // with a rotation, at the point that has most
+    for (const ScanPoint& point : points_) {
+      if (point.squares.empty()) continue;
+      if (noise_ < 0.0 || point.noise < noise_) noise_ = point.noise;
+      pairs = std::max(pairs, point.squares.size());
+      gyro_power_ = std::max(gyro_power_, point.gyro_power);
+    }
+    const double cap = 2.0 * std::pow(kTruncateSigmas * noise_, 2);
+    for (ScanPoint& point : points_) {
+      point.loss = Eigen::VectorXd::Zero(kBlocks);
+      for (size_t i = 0; i < point.squares.size(); ++i) {
+        point.loss[point.blocks[i]] += std::min(point.squares[i], cap);
+      }
+      // A pair that found no rotation at this point counts as an outlier.
+      point.loss.array() += cap * static_cast<double>(pairs - point.squares.size()) / kBlocks;
+    }
+  }
+
+  std::vector<ScanPoint> points_;
+  double spacing_, means_of_;
+  double noise_ = -1.0, gyro_power_ = 0.0;
+};
+
+// The scans, step by step.
 class FocalScan {
  public:
-  FocalScan(const Recording& recording, const CameraRotationsAtFocals& rotations_at,
+  FocalScan(const Recording& recording, const CameraRotationsAt& rotations_at,
             const StartOptions& options, const FocalScanOptions& scan_options)
       : recording_(recording),
         rotations_at_(rotations_at),
         options_(options),
+        scan_options_(scan_options),
         log_guess_(std::log(FocalToBeginWith(recording.camera))),
         spacing_(std::log(scan_options.max_focal / scan_options.min_focal) /
-                 (scan_options.points - 1)) {
-    const double side_px = std::max(recording.camera.width_px, recording.camera.height_px);
-    const double log_min = std::log(scan_options.min_focal * side_px);
-    points_.resize(static_cast<size_t>(scan_options.points));
-    for (size_t k = 0; k < points_.size(); ++k) {
-      points_[k].log_focal = log_min + spacing_ * static_cast<double>(k);
-    }
-    FindRotations(&points_);
-  }
+                 (scan_options.points - 1)),
+        interval_s_(UsualInterval(recording)) {}
 
-  // Delay and orientation, to which a wrong focal length is mostly a scale: from the points nearest
-  // to the guess outwards, the first that works.
+  // Delay and orientation, to which a wrong focal length is mostly a scale: from the focal lengths
+  // nearest to the guess outwards, the first that works.
   Status FindNear() {
-    std::vector<size_t> order(points_.size());
-    std::iota(order.begin(), order.end(), size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-      return std::abs(points_[a].log_focal - log_guess_) <
-             std::abs(points_[b].log_focal - log_guess_);
+    std::vector<double> logs = LogFocals();
+    std::stable_sort(logs.begin(), logs.end(), [&](double a, double b) {
+      return std::abs(a - log_guess_) < std::abs(b - log_guess_);
     });
-    StartOptions loose = options_;
-    loose.max_rate_ratio = kLooseRateRatio;
-    Status first_error = CannotEstimate("");
-    for (const size_t k : order) {
-      Result<StartResult> near = FindStart(recording_, points_[k].rotations, loose);
-      if (near) {
-        near_ = std::move(*near);
-        return {};
-      }
-      if (k == order.front()) first_error = tl::unexpected<Error>(near.error());
+    const Status first = FindNearAt({logs.front()});
+    if (first || FindNearAt({logs.begin() + 1, logs.end()})) {
+      rough_ =
+          RoughlyAligned(near_, recording_.camera.readout_s.value_or(kUsualReadout * interval_s_));
+      return {};
     }
-    return first_error;
+    return first;
   }
 
-  // The loss at every point, and at two points more around the best.
-  void Scan() {
-    for (ScanPoint& point : points_) MeasureAt(&point);
-    Truncate();
-    const double coarse = points_[BestPoint()].log_focal;
-    std::vector<ScanPoint> between(2);
-    between[0].log_focal = coarse - 0.5 * spacing_;
-    between[1].log_focal = coarse + 0.5 * spacing_;
-    FindRotations(&between);
-    for (ScanPoint& point : between) {
-      MeasureAt(&point);
-      points_.push_back(std::move(point));
-    }
-    Truncate();
-    std::sort(points_.begin(), points_.end(),
-              [](const ScanPoint& x, const ScanPoint& y) { return x.log_focal < y.log_focal; });
-  }
-
-  // The focal length, by the parabola around the best point.
-  StartFocal Fit() const {
+  // The focal length, by the parabola around the best of all, or of every `step`-th.
+  StartFocal ScanFocals(size_t step) {
+    std::vector<double> logs;
+    for (size_t k = 0; k < LogFocals().size(); k += step) logs.push_back(LogFocals()[k]);
+    // The inverse of what FindStart makes of a lag.
+    const double lag_s =
+        (near_.delay_middle_row_s -
+         SecondsSince(recording_.frames.front().stamp_ns, recording_.gyro.front().stamp_ns)) *
+        (1.0 + near_.clock_skew);
+    const ScanCurve curve = Scan(
+        logs, static_cast<double>(step) * spacing_, /*means_of=*/1.0,
+        [this](double x) {
+          return RotationTrial{std::exp(x), rough_};
+        },
+        [&](ScanPoint* point) { MeasureAngles(recording_, near_, lag_s, options_, point); });
+    const double best_px = curve.Best().trial.focal_px;
     StartFocal focal;
-    const size_t best = BestPoint();
-    const double best_log = points_[best].log_focal, best_loss = points_[best].loss.sum();
-    double second_loss = -1.0;
-    std::vector<size_t> close;
-    for (size_t k = 0; k < points_.size(); ++k) {
-      const double loss = points_[k].loss.sum();
-      const double distance = std::abs(points_[k].log_focal - best_log);
+    for (const ScanPoint& point : curve.points()) {
       focal.curve.push_back(
-          {std::exp(points_[k].log_focal), loss / (gyro_power_ * std::exp(2.0 * best_log))});
-      if (distance < 1.1 * spacing_) close.push_back(k);
-      if (distance > kDistinctLog && (second_loss < 0.0 || loss < second_loss)) second_loss = loss;
+          {point.trial.focal_px, point.loss.sum() / (curve.gyro_power() * best_px * best_px)});
     }
-    focal.runner_up_ratio = second_loss > 0.0 ? best_loss / second_loss : 1.0;
-    const bool inside = best > 0 && best + 1 < points_.size();
-    auto [log_focal, sigma_log] = Minimum(close, best_log, inside);
+    focal.runner_up_ratio = curve.RunnerUpRatio(kDistinctLog);
+    auto [log_focal, sigma_log] = curve.Minimum();
     sigma_log = std::hypot(sigma_log, kModelLog);
     focal.determined = sigma_log < kDeterminedLog && focal.runner_up_ratio < kMaxRunnerUp;
+    best_focal_px_ = std::exp(log_focal);
     if (!focal.determined) {
       log_focal = log_guess_;
       sigma_log = kUnknownLog;
@@ -169,84 +245,121 @@ class FocalScan {
     return focal;
   }
 
+  // The alignment anew, from rotations at the best focal length that are made with the last one.
+  void Improve() {
+    StartOptions loose = options_;
+    loose.max_rate_ratio = kLooseRateRatio;
+    Result<StartResult> better =
+        FindStart(recording_, rotations_at_(recording_, {{best_focal_px_, rough_}}).front(), loose);
+    if (!better) return;
+    near_ = std::move(*better);
+    rough_ = RoughlyAligned(near_, rough_.readout_s);
+  }
+
+  // The readout time at the best focal length, likewise: the one with which the matches of two
+  // pictures fit each other best. (Their rotations and the gyro's tell less: one of 10 ms too much
+  // is as good, in a walk with 0.5 px of noise.) What it finds, the next rotations are made with.
+  StartReadout ScanReadouts() {
+    const int count = scan_options_.readouts;
+    const double spacing = 2.0 * scan_options_.max_readout / (count - 1);
+    std::vector<double> parts;
+    for (int k = 0; k < count; ++k) parts.push_back(spacing * k - scan_options_.max_readout);
+    const ScanCurve curve = Scan(
+        parts, spacing, kLeastMatches,
+        [this](double part) {
+          RotationTrial trial{best_focal_px_, rough_};
+          trial.rough->readout_s = part * interval_s_;
+          return trial;
+        },
+        [this](ScanPoint* point) { MeasureMatches(recording_, point); });
+    StartReadout readout;
+    auto [part, sigma] = curve.Minimum();
+    sigma = std::hypot(sigma, kModelReadout);
+    readout.determined =
+        sigma < kDeterminedReadout && curve.RunnerUpRatio(1.5 * spacing) < kMaxRunnerUp;
+    readout.value_s = (readout.determined ? part : kUsualReadout) * interval_s_;
+    readout.sigma_s = (readout.determined ? sigma : kUnknownReadout) * interval_s_;
+    rough_.readout_s = readout.value_s;
+    return readout;
+  }
+
+  // The start at a focal length.
+  Result<StartResult> StartAt(double focal_px) const {
+    return FindStart(recording_, rotations_at_(recording_, {{focal_px, rough_}}).front(), options_);
+  }
+
  private:
-  void FindRotations(std::vector<ScanPoint>* points) const {
-    std::vector<double> focals_px;
-    for (const ScanPoint& point : *points) focals_px.push_back(std::exp(point.log_focal));
-    std::vector<std::vector<CameraRotation>> rotations = rotations_at_(focals_px);
-    for (size_t k = 0; k < points->size(); ++k) (*points)[k].rotations = std::move(rotations[k]);
+  static double UsualInterval(const Recording& recording) {
+    return std::min(1.0 / 30.0, MedianInterval(recording.frames));
   }
 
-  void MeasureAt(ScanPoint* point) const {
-    // The inverse of what FindStart makes of a lag.
-    const double lag_s =
-        (near_.delay_middle_row_s -
-         SecondsSince(recording_.frames.front().stamp_ns, recording_.gyro.front().stamp_ns)) *
-        (1.0 + near_.clock_skew);
-    Measure(recording_, near_, lag_s, options_, point);
+  std::vector<double> LogFocals() const {
+    const CameraGuess& camera = recording_.camera;
+    const double log_min =
+        std::log(scan_options_.min_focal * std::max(camera.width_px, camera.height_px));
+    std::vector<double> logs;
+    for (int k = 0; k < scan_options_.points; ++k) logs.push_back(log_min + spacing_ * k);
+    return logs;
   }
 
-  // Losses, bounded by the least noise of any point.
-  void Truncate() {
-    for (const ScanPoint& point : points_) {
-      if (point.squares.empty()) continue;
-      if (noise_px_s_ < 0.0 || point.noise_px_s < noise_px_s_) noise_px_s_ = point.noise_px_s;
-      pairs_ = std::max(pairs_, point.squares.size());
-      gyro_power_ = std::max(gyro_power_, point.gyro_power);
-    }
-    const double cap = 2.0 * std::pow(kTruncateSigmas * noise_px_s_, 2);
-    for (ScanPoint& point : points_) {
-      point.loss = Eigen::VectorXd::Zero(kBlocks);
-      for (size_t i = 0; i < point.squares.size(); ++i) {
-        point.loss[point.blocks[i]] += std::min(point.squares[i], cap);
+  // The first start that works, without knowing anything of the gyro; else why the first did not.
+  Status FindNearAt(const std::vector<double>& log_focals) {
+    StartOptions loose = options_;
+    loose.max_rate_ratio = kLooseRateRatio;
+    std::vector<RotationTrial> trials;
+    for (const double log_focal : log_focals) trials.push_back({std::exp(log_focal), std::nullopt});
+    Status first_error = CannotEstimate("");
+    const auto rotations = rotations_at_(recording_, trials);
+    for (size_t k = 0; k < trials.size(); ++k) {
+      Result<StartResult> near = FindStart(recording_, rotations[k], loose);
+      if (near) {
+        near_ = std::move(*near);
+        return {};
       }
-      // A pair that found no rotation at this focal length counts as an outlier.
-      point.loss.array() += cap * static_cast<double>(pairs_ - point.squares.size()) / kBlocks;
+      if (k == 0) first_error = tl::unexpected<Error>(near.error());
     }
+    return first_error;
   }
 
-  size_t BestPoint() const {
-    return static_cast<size_t>(std::min_element(points_.begin(), points_.end(),
-                                                [](const ScanPoint& x, const ScanPoint& y) {
-                                                  return x.loss.sum() < y.loss.sum();
-                                                }) -
-                               points_.begin());
-  }
-
-  // Of the parabola through some points: log of the focal length, and its standard deviation.
-  std::pair<double, double> Minimum(const std::vector<size_t>& close, double best_log,
-                                    bool inside) const {
-    Eigen::VectorXd x(static_cast<Eigen::Index>(close.size()));
-    Eigen::MatrixXd y(static_cast<Eigen::Index>(close.size()), kBlocks);
-    for (size_t k = 0; k < close.size(); ++k) {
-      x[static_cast<Eigen::Index>(k)] = points_[close[k]].log_focal - best_log;
-      y.row(static_cast<Eigen::Index>(k)) = points_[close[k]].loss.transpose();
+  // The losses at all values, and at two more around the best of them.
+  template <typename MakeTrial, typename Measure>
+  ScanCurve Scan(const std::vector<double>& values, double spacing, double means_of,
+                 const MakeTrial& trial_at, const Measure& measure) const {
+    const auto measure_all = [&](const std::vector<double>& xs) {
+      std::vector<RotationTrial> trials;
+      for (const double x : xs) trials.push_back(trial_at(x));
+      std::vector<std::vector<CameraRotation>> rotations = rotations_at_(recording_, trials);
+      std::vector<ScanPoint> points(xs.size());
+      for (size_t k = 0; k < points.size(); ++k) {
+        points[k].x = xs[k];
+        points[k].trial = trials[k];
+        points[k].rotations = std::move(rotations[k]);
+        measure(&points[k]);
+      }
+      return points;
+    };
+    std::vector<ScanPoint> points = measure_all(values);
+    const double best = ScanCurve(points, spacing, means_of).Best().x;
+    for (ScanPoint& point : measure_all({best - 0.5 * spacing, best + 0.5 * spacing})) {
+      points.push_back(std::move(point));
     }
-    const Eigen::MatrixXd parabolas = FitParabola(x, y);
-    const Eigen::Vector3d sum = parabolas.rowwise().sum();
-    if (!inside || !(sum[2] > 0.0)) return {best_log, 1.0};
-    const double shift = std::clamp(-0.5 * sum[1] / sum[2], -spacing_, spacing_);
-    const double classical = noise_px_s_ * noise_px_s_ / sum[2];
-    const double scores = (parabolas.row(1) + 2.0 * shift * parabolas.row(2)).squaredNorm() *
-                          kBlocks / (kBlocks - 1.0);
-    const double sandwich = scores / (4.0 * sum[2] * sum[2]);
-    return {best_log + shift, std::min(1.0, std::sqrt(std::max(classical, sandwich)))};
+    return ScanCurve(std::move(points), spacing, means_of);
   }
 
   const Recording& recording_;
-  const CameraRotationsAtFocals& rotations_at_;
+  const CameraRotationsAt& rotations_at_;
   const StartOptions& options_;
-  const double log_guess_, spacing_;
-  std::vector<ScanPoint> points_;
+  const FocalScanOptions& scan_options_;
+  const double log_guess_, spacing_, interval_s_;
   StartResult near_;
-  double noise_px_s_ = -1.0, gyro_power_ = 0.0;
-  size_t pairs_ = 1;  // with a rotation, at the point that has most
+  RoughAlignment rough_;  // of near_, and the readout time as it is known so far
+  double best_focal_px_ = 0.0;
 };
 
 }  // namespace
 
 Result<StartResult> FindStartAndFocal(const Recording& recording,
-                                      const CameraRotationsAtFocals& rotations_at,
+                                      const CameraRotationsAt& rotations_at,
                                       const StartOptions& options,
                                       const FocalScanOptions& scan_options) {
   if (!(std::max(recording.camera.width_px, recording.camera.height_px) > 0)) {
@@ -259,12 +372,17 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
       !(scan_options.max_focal > scan_options.min_focal)) {
     return BadUsage("focal scan: expected 5 points or more and 0 < min_focal < max_focal");
   }
+  if (scan_options.readouts < 5 || !(scan_options.max_readout > 0.0)) {
+    return BadUsage("readout scan: expected 5 points or more and 0 < max_readout");
+  }
   FocalScan scan(recording, rotations_at, options, scan_options);
   if (const Status near = scan.FindNear(); !near) return tl::unexpected(near.error());
-  scan.Scan();
-  StartFocal focal = scan.Fit();
-  // The start at that focal length.
-  auto start = FindStart(recording, rotations_at({focal.value_px}).front(), options);
+  StartReadout readout{recording.camera.readout_s.value_or(0.0), 0.0, true};
+  scan.ScanFocals(/*step=*/2);
+  scan.Improve();
+  if (!recording.camera.readout_s) readout = scan.ScanReadouts();
+  StartFocal focal = scan.ScanFocals(/*step=*/1);
+  auto start = scan.StartAt(focal.value_px);
   if (!start) return start;
   if (!focal.determined) {
     start->notes.push_back(
@@ -273,6 +391,7 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
         " is used");
   }
   start->focal = std::move(focal);
+  start->readout = readout;
   return start;
 }
 

@@ -1,4 +1,4 @@
-// Start with an unknown focal length: a scan of the field of view.
+// Start with an unknown focal length and readout time: scans of both.
 #ifndef CAMGYRO_ESTIMATOR_START_FOCAL_SCAN_H_
 #define CAMGYRO_ESTIMATOR_START_FOCAL_SCAN_H_
 
@@ -11,16 +11,21 @@
 
 namespace camgyro {
 
-// Camera rotations of a recording as its pictures give them for a focal length [px]. Called about
-// thirty times; a few hundred pairs are enough.
-using CameraRotationsAtFocals =
-    std::function<std::vector<std::vector<CameraRotation>>(const std::vector<double>& focals_px)>;
+// Camera rotations as a recording's pictures give them in each of some trials, which are best
+// sorted. About sixty in all; a few hundred pairs are enough.
+using CameraRotationsAt = std::function<std::vector<std::vector<CameraRotation>>(
+    const Recording& recording, const std::vector<RotationTrial>& trials)>;
 
 struct FocalScanOptions {
   // Of the picture's longer side: 0.4 is a full field of view of 103 deg, 1.8 of 31 deg.
   double min_focal = 0.4;
   double max_focal = 1.8;
   int points = 22;  // logarithmic; 7 % apart
+  // Readout times tried, as parts of the frame interval, of both signs (a picture that was turned
+  // by half a turn has its last row read first). Phones that need all of it are common, and a
+  // minimum is only told from a slope with points on both sides.
+  double max_readout = 1.25;
+  int readouts = 11;
 };
 
 // The gyro measures angles, the picture measures pan and tilt as angle times focal length (roll
@@ -30,8 +35,13 @@ struct FocalScanOptions {
 // the motion does not tell (roll only, hardly any rotation) or the lens distorts so much that the
 // minimum is shallow, focal->determined is false, a note says so, and the recording's guess is
 // used, or 0.85 of the longer side without one.
+//
+// All rotations but the first, which say how the gyro lies to the camera, are made with what is
+// known of that (RotationTrial::rough). The readout time, where the recording does not declare it,
+// is the one with which they fit the gyro best, found likewise at the best focal length of a first
+// scan, and used in a second one.
 Result<StartResult> FindStartAndFocal(const Recording& recording,
-                                      const CameraRotationsAtFocals& rotations_at,
+                                      const CameraRotationsAt& rotations_at,
                                       const StartOptions& options,
                                       const FocalScanOptions& scan_options);
 

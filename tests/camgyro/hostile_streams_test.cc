@@ -114,8 +114,8 @@ TEST_P(HostileStreams, CalibrateAnswers) {
   const std::vector<FramePair> pairs = PairsForRotations(recording);
   const Result<CalibrationReport> report =
       CalibrateRecording(recording,
-                         [&](const std::vector<double>& focals_px) {
-                           return CameraRotationsOf(pairs, recording.camera, focals_px);
+                         [&](const Recording& now, const std::vector<RotationTrial>& trials) {
+                           return CameraRotationsOf(now, pairs, trials);
                          },
                          {});
   if (report) {

@@ -6,10 +6,19 @@
 #include <vector>
 
 #include "core/so3.h"
+#include "frontend/gyro_rotation.h"
+#include "simulation/simulate.h"
 #include "tests/frontend/two_view_scene.h"
 
 namespace camgyro {
 namespace {
+
+Recording Pictures() {
+  Recording recording;
+  recording.camera.width_px = 640;
+  recording.camera.height_px = 480;
+  return recording;
+}
 
 // A motion that is followed from one focal length to the next is the one that a search there finds,
 // but for pairs whose motion has two minima that are about as good.
@@ -20,20 +29,17 @@ TEST(CameraRotationsOf, FollowsWhatASearchFinds) {
   scene.noise_px = 0.3;
   std::vector<FramePair> pairs;
   for (unsigned seed = 0; seed < 40; ++seed) {
-    pairs.push_back(scene.Make(100, seed));
+    pairs.push_back(scene.Make(60, seed));
     pairs.back().frame_a = static_cast<int>(seed);
   }
-  CameraGuess camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  std::vector<double> focals_px;
-  for (int k = 0; k < 8; ++k) focals_px.push_back(350.0 * std::pow(1.07, k));
-  const auto followed = CameraRotationsOf(pairs, camera, focals_px);
-  ASSERT_EQ(followed.size(), focals_px.size());
+  std::vector<RotationTrial> trials;
+  for (int k = 0; k < 8; ++k) trials.push_back({350.0 * std::pow(1.07, k), {}});
+  const auto followed = CameraRotationsOf(Pictures(), pairs, trials);
+  ASSERT_EQ(followed.size(), trials.size());
   int same = 0, all = 0;
-  for (size_t k = 0; k < focals_px.size(); ++k) {
+  for (size_t k = 0; k < trials.size(); ++k) {
     const std::vector<CameraRotation> searched =
-        CameraRotationsOf(pairs, camera, {focals_px[k]}).front();
+        CameraRotationsOf(Pictures(), pairs, {trials[k]}).front();
     ASSERT_EQ(followed[k].size(), searched.size());
     for (size_t i = 0; i < searched.size(); ++i) {
       ASSERT_EQ(followed[k][i].frame_a, searched[i].frame_a);
@@ -73,14 +79,47 @@ TEST(CameraRotationsOf, LeavesOutPairsThatHaveNone) {
   TwoViewScene scene;
   scene.p_a = Eigen::Vector3d(0.08, -0.02, 0.05);
   const std::vector<FramePair> pairs = {scene.Make(100, 1), scene.Make(5, 2), scene.Make(100, 3)};
-  CameraGuess camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  const auto found = CameraRotationsOf(pairs, camera, {450.0, 480.0});
+  const auto found = CameraRotationsOf(Pictures(), pairs, {{450.0, {}}, {480.0, {}}});
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].size(), 2u);
   EXPECT_EQ(found[1].size(), 2u);
-  EXPECT_TRUE(CameraRotationsOf(pairs, camera, {}).empty());
+  EXPECT_TRUE(CameraRotationsOf(Pictures(), pairs, {}).empty());
+}
+
+// Rates that change while the rows are read look like parallax. The gyro undoes it, also where its
+// delay, orientation and readout time are off by what a start's are.
+TEST(CameraRotationsOf, AGyroUndoesTheRollingShutter) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 8.0;
+  scenario.camera.readout_s = 0.024;
+  scenario.tracks.noise_px = 0.1;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const std::vector<FramePair> pairs = PairsForRotations(s.recording);
+  const Calibration& truth = s.truth;
+  RoughAlignment rough;
+  rough.q_gyro_cam = truth.q_gyro_cam * Exp(Eigen::Vector3d(0.01, -0.01, 0.01));
+  rough.bias_gyro_rad_s = truth.bias_gyro_rad_s;
+  rough.readout_s = 0.020;
+  rough.delay_middle_row_s = truth.delay_s + 0.5 * truth.readout_s + 0.003;
+  const double focal_px = truth.lens[kFocal];
+  const auto rms_of = [&](const std::vector<CameraRotation>& rotations) {
+    EXPECT_GE(rotations.size(), pairs.size() - 5);
+    double sum = 0.0;
+    for (const CameraRotation& rotation : rotations) {
+      const auto between = GyroRotation::Between(s.recording.gyro, truth,
+                                                 s.recording.frames[rotation.frame_a].stamp_ns,
+                                                 s.recording.frames[rotation.frame_b].stamp_ns);
+      if (!between) continue;
+      const double angle =
+          rotation.q_a_b.angularDistance(Eigen::Quaterniond(between->BetweenMiddleRows()));
+      sum += angle * angle;
+    }
+    return std::sqrt(sum / static_cast<double>(rotations.size()));
+  };
+  const double without = rms_of(CameraRotationsOf(s.recording, pairs, {{focal_px, {}}}).front());
+  const double with = rms_of(CameraRotationsOf(s.recording, pairs, {{focal_px, rough}}).front());
+  EXPECT_GT(without, 0.004);
+  EXPECT_LT(with, 0.3 * without);
 }
 
 }  // namespace

@@ -53,7 +53,9 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
     const TimedPair& pair = neighbours[i];
     pairs.push_back({pair.frame_a, pair.frame_b, MatchesOf(recording, pair)});
   }
-  CameraGuess camera = recording.camera;
+  Recording shown;
+  shown.camera = recording.camera;
+  CameraGuess& camera = shown.camera;
   const LensParameters lens = calibration.FullLens();
   camera.aspect_ratio = lens[kAspect];
   camera.principal_px = Eigen::Vector2d(lens[kCx], lens[kCy]);
@@ -62,7 +64,7 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
       StandardDistortion(calibration.distortion_model, lens, size_px);
   camera.distortion_model = distortion.model;
   camera.distortion.assign(distortion.k.data(), distortion.k.data() + 4);
-  return CameraRotationsOf(pairs, camera, {lens[kFocal]}).front();
+  return CameraRotationsOf(shown, pairs, {{lens[kFocal], {}}}).front();
 }
 
 std::vector<RatePoint> RatePoints(const Recording& recording, const Calibration& calibration) {

@@ -145,7 +145,7 @@ TEST(DataFaults, ARateThatIsNotWhatTheFileClaims) {
 
 TEST(DataFaults, RepairsUnitAndHandedness) {
   const auto simulated = Simulate({"motion.kind=running"});
-  const auto rotations_at = [&](const std::vector<double>&) {
+  const auto rotations_at = [&](const Recording&, const std::vector<RotationTrial>&) {
     return std::vector<std::vector<CameraRotation>>{TrueRotations(simulated)};
   };
   EXPECT_FALSE([&] {  // a mirrored gyro of a sound recording explains less
@@ -199,8 +199,7 @@ TEST(DataFaults, ElectronicStabilisationInTheRotationsThatTheStartUses) {
     if (stabilised) overrides.push_back(stabiliser);
     const auto s = Simulate(overrides);
     const std::vector<CameraRotation> rotations =
-        CameraRotationsOf(PairsForRotations(s.recording), s.recording.camera,
-                          {s.truth.lens[kFocal]})
+        CameraRotationsOf(s.recording, PairsForRotations(s.recording), {{s.truth.lens[kFocal], {}}})
             .front();
     EXPECT_EQ(FindElectronicStabilisation(s.recording, rotations).has_value(), stabilised);
   }

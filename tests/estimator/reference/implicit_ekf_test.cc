@@ -340,8 +340,8 @@ TEST(CalibrateWithEkf, RefusesWhatHasNoRotation) {
   scenario.motion.rotation_rms_rad_s.setZero();
   scenario.gyro.accelerometer = false;
   const Simulated s = simulation::SimulateTracks(scenario).value();
-  const auto none = [](const std::vector<double>& focals_px) {
-    return std::vector<std::vector<CameraRotation>>(focals_px.size());
+  const auto none = [](const Recording&, const std::vector<RotationTrial>& trials) {
+    return std::vector<std::vector<CameraRotation>>(trials.size());
   };
   const auto report = CalibrateWithEkf(s.recording, none, {}, {});
   ASSERT_FALSE(report);

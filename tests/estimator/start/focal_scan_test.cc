@@ -13,13 +13,13 @@ constexpr double kTrueFocalPx = 500.0;
 
 // Rotations as pictures give them at a wrong focal length, to first order: image motion is focal
 // length times pan and tilt, and the roll angle itself.
-CameraRotationsAtFocals SeenAt(const Simulated& s) {
-  return [&s](const std::vector<double>& focals_px) {
-    std::vector<std::vector<CameraRotation>> seen(focals_px.size(), s.rotations);
+CameraRotationsAt SeenAt(const Simulated& s) {
+  return [&s](const Recording&, const std::vector<RotationTrial>& trials) {
+    std::vector<std::vector<CameraRotation>> seen(trials.size(), s.rotations);
     for (size_t k = 0; k < seen.size(); ++k) {
       for (CameraRotation& rotation : seen[k]) {
         Eigen::Vector3d angle = Log(rotation.q_a_b);
-        angle.head<2>() *= kTrueFocalPx / focals_px[k];
+        angle.head<2>() *= kTrueFocalPx / trials[k].focal_px;
         rotation.q_a_b = Exp(angle);
       }
     }
@@ -36,8 +36,9 @@ SimulatedTruth CoarseTruth() {
   return truth;
 }
 
-Simulated MakeScene(const RateFunction& rate, int seed) {
-  Simulated s = Simulate(rate, CoarseTruth(), seed);
+Simulated MakeScene(const RateFunction& rate, int seed,
+                    const SimulatedTruth& truth = CoarseTruth()) {
+  Simulated s = Simulate(rate, truth, seed);
   s.recording.camera.width_px = 640;
   s.recording.camera.height_px = 480;
   return s;
@@ -58,11 +59,51 @@ TEST(FindStartAndFocal, FindsTheFocalLength) {
     EXPECT_LT(start->focal->runner_up_ratio, 0.7);
     EXPECT_NEAR(start->delay_middle_row_s, CoarseTruth().delay_s, 0.003);
     EXPECT_EQ(start->focal->curve.size(), 24u);
+    ASSERT_TRUE(start->readout);
+    EXPECT_FALSE(start->readout->determined);  // these rotations do not depend on it
     chi_square +=
         std::pow((start->focal->value_px - kTrueFocalPx) / start->focal->sigma_px, 2) / kRuns;
   }
   // 10 values: sigma 0.45 about 1.
   EXPECT_LT(chi_square, 2.3);
+}
+
+// What is wrong about the readout time, times the difference of the rates at the ends of a pair, is
+// left between its matches: some of it, beside their noise.
+TEST(FindStartAndFocal, FindsTheReadoutTime) {
+  const RateFunction rate = SmoothRandomRate(70, 0.8);
+  for (const double readout_s : {-0.02, 0.0, 0.013, 0.031}) {
+    SCOPED_TRACE(readout_s);
+    Simulated s = MakeScene(rate, 0);
+    const CameraRotationsAt plain = SeenAt(s);
+    const auto rolling = [&](const Recording& recording, const std::vector<RotationTrial>& trials) {
+      auto seen = plain(recording, trials);
+      for (size_t k = 0; k < seen.size(); ++k) {
+        const double wrong_s = (trials[k].rough ? trials[k].rough->readout_s : 0.0) - readout_s;
+        for (CameraRotation& rotation : seen[k]) {
+          const auto rate_at = [&](int frame) {
+            const int64_t stamp_ns = recording.frames[static_cast<size_t>(frame)].stamp_ns;
+            return rate(1e-9 * static_cast<double>(stamp_ns) + CoarseTruth().delay_s);
+          };
+          const Eigen::Vector3d change = rate_at(rotation.frame_b) - rate_at(rotation.frame_a);
+          rotation.residual_px = std::hypot(0.3, 0.2 * kTrueFocalPx * wrong_s * change.norm());
+        }
+      }
+      return seen;
+    };
+    const auto start = FindStartAndFocal(s.recording, rolling, {}, {});
+    ASSERT_TRUE(start) << start.error().message;
+    ASSERT_TRUE(start->readout);
+    EXPECT_TRUE(start->readout->determined);
+    EXPECT_NEAR(start->readout->value_s, readout_s, 3.0 * start->readout->sigma_s);
+    EXPECT_LT(start->readout->sigma_s, 0.003);
+
+    s.recording.camera.readout_s = readout_s;
+    const auto declared = FindStartAndFocal(s.recording, rolling, {}, {});
+    ASSERT_TRUE(declared) << declared.error().message;
+    EXPECT_EQ(declared->readout->value_s, readout_s);
+    EXPECT_EQ(declared->readout->sigma_s, 0.0);
+  }
 }
 
 TEST(FindStartAndFocal, AGuessThatIsFarOffDoesNotMatter) {

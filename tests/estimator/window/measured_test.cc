@@ -28,8 +28,8 @@ Result<CalibrationReport> Calibrate(Recording* recording) {
   const std::vector<FramePair> pairs = PairsForRotations(*recording, 400);
   return CalibrateRecording(
       *recording,
-      [&](const std::vector<double>& focals_px) {
-        return CameraRotationsOf(pairs, recording->camera, focals_px);
+      [&](const Recording& now, const std::vector<RotationTrial>& trials) {
+        return CameraRotationsOf(now, pairs, trials);
       },
       CalibrateOptions());
 }
