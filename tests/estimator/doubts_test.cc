@@ -41,5 +41,31 @@ TEST(Doubts, NothingIsBelievedOfAFocalLengthThatNoLensHas) {
   }
 }
 
+// A lens that bends lines and that nothing declares sends the focal length of a fit to thrice of
+// what it is; that of the rotations stays.
+TEST(Doubts, AFocalLengthFarFromThatOfTheRotations) {
+  const simulation::Simulated s = simulation::SimulateTracks(ShortScenario(1.0)).value();
+  CalibrationReport report;
+  report.converged = true;
+  report.calibration = s.truth;
+  const double focal_px = s.truth.lens[kFocal];
+  report.start.focal = StartFocal{focal_px, 0.02 * focal_px, /*determined=*/true, 0.5, {}};
+  const auto doubts_of = [&](double found_px) {
+    report.doubts.clear();
+    report.calibration.lens[kFocal] = found_px;
+    AddDoubts(s.recording, &report);
+    return report.doubts;
+  };
+  for (const double as_it_was : {0.9, 1.0, 1.1}) {
+    EXPECT_THAT(doubts_of(as_it_was * focal_px), ::testing::IsEmpty());
+  }
+  for (const double far : {0.6, 1.5, 3.0}) {
+    EXPECT_THAT(doubts_of(far * focal_px),
+                ::testing::ElementsAre(::testing::HasSubstr("--effects=radial_distortion")));
+  }
+  report.start.focal->determined = false;
+  EXPECT_THAT(doubts_of(3.0 * focal_px), ::testing::IsEmpty());
+}
+
 }  // namespace
 }  // namespace camgyro
