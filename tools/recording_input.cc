@@ -13,8 +13,7 @@
 DEFINE_double(focal_px, 0.0, "first guess of the focal length; default: sensor.yaml's, else found");
 DEFINE_double(
     readout_ms, 0.0,
-    "first guess of the readout time, first to last row; default: sensor.yaml's, else half "
-    "a frame interval");
+    "first guess of the readout time, first to last row; default: sensor.yaml's, else found");
 DEFINE_double(delay_ms, 0.0,
               "centre of the delay search, gyro clock minus camera stamp; default: sensor.yaml's, "
               "else 0");
