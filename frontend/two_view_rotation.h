@@ -59,7 +59,7 @@ std::optional<CameraRotation> EstimateCameraRotation(
 //
 // Without it, rates that change while the rows are read look like parallax: on tools/sample (24 ms,
 // rendered) the rotations' residuals are those of 35 px/s in the middle of the picture, with it
-// (and the readout time that the start finds) 4 px/s.
+// (and the readout time that the start finds) 4 px/s (docs/lab/start.md).
 std::optional<CameraRotation> EstimateCameraRotation(const FramePair& pair,
                                                      const GyroRotation& gyro,
                                                      const TwoViewOptions& options = {});
