@@ -25,14 +25,14 @@ constexpr double kMedianNorm2 = 1.177;   // median norm of 2 normal variables of
 constexpr double kDeterminedLog = 0.1;   // sigma of log f
 constexpr double kDistinctLog = 0.22;    // 25 %
 constexpr double kMaxRunnerUp = 0.8;     // a wrong lens moves shallow minima far
-constexpr double kModelLog = 0.02;       // rotations of pictures neglect rolling shutter and lens
+constexpr double kModelLog = 0.02;       // a lens that nothing declares bends it further
 constexpr double kUnknownLog = 0.3;      // what is known of any lens
 // Parts of the frame interval: what is taken where nothing tells, and its sigma; the largest sigma
 // of what is told.
 constexpr double kUsualReadout = 0.5;
 constexpr double kUnknownReadout = 0.3;
 constexpr double kDeterminedReadout = 0.15;
-constexpr double kModelReadout = 0.05;   // the loss is no parabola: 1 ms rms in simulated walks
+constexpr double kModelReadout = 0.05;   // the loss is no parabola (docs/lab/start.md)
 constexpr double kLeastMatches = 15.0;   // of a pair that has a rotation
 constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
 
@@ -257,8 +257,8 @@ class FocalScan {
   }
 
   // The readout time at the best focal length, likewise: the one with which the matches of two
-  // pictures fit each other best. (Their rotations and the gyro's tell less: one of 10 ms too much
-  // is as good, in a walk with 0.5 px of noise.) What it finds, the next rotations are made with.
+  // pictures fit each other best. (Their rotations and the gyro's tell less:
+  // docs/lab/start.md.) What it finds, the next rotations are made with.
   StartReadout ScanReadouts() {
     const int count = scan_options_.readouts;
     const double spacing = 2.0 * scan_options_.max_readout / (count - 1);
