@@ -122,6 +122,7 @@ void Read(YamlSection section, GyroOptions* gyro) {
 void Read(YamlSection section, TrackOptions* tracks) {
   section.Read("count", &tracks->count);
   section.Read("noise_px", &tracks->noise_px, Range::kNotNegative);
+  section.Read("noise_scatter", &tracks->noise_scatter, Range::kNotNegative);
   section.Read("reanchored", &tracks->reanchored);
   section.Read("outlier_fraction", &tracks->outlier_fraction, Range::kFraction);
   section.Read("outlier_px", &tracks->outlier_px, Range::kNotNegative);

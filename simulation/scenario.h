@@ -109,6 +109,10 @@ struct GyroOptions {
 struct TrackOptions {
   int count = 100;  // per frame
   double noise_px = 1.0;
+  // Of the logarithm of the noise, from frame to frame around noise_px: pictures are blurred and
+  // dark for a while. Neighbours share most of it, with a memory of kNoiseMemoryS.
+  double noise_scatter = 0.0;
+  static constexpr double kNoiseMemoryS = 0.25;
   // False: independent per observation. True: a tracker that re-anchors at every frame; the track
   // then walks over the scene, and the noise of a pair is in its second image only.
   bool reanchored = false;

@@ -20,7 +20,8 @@ enum Stream : uint32_t {
   kGyroStream,
   kFrameStream,
   kTrackStream,
-  kWanderStream
+  kWanderStream,
+  kNoiseStream
 };
 
 std::mt19937_64 MakeRandom(uint64_t seed, Stream stream) {
@@ -65,16 +66,41 @@ struct Landmark {
   int surface = -1;  // of the scene; -1: none
 };
 
+// A number for each frame, of mean 0 and standard deviation 1, that neighbours share: its
+// correlation falls by a factor of e over the memory.
+class Wander {
+ public:
+  Wander(const Scenario& scenario, double memory_s, Stream stream)
+      : kept_(std::exp(-1.0 / (scenario.camera.rate_hz * memory_s))),
+        random_(MakeRandom(scenario.seed, stream)),
+        value_(normal_(random_)) {}
+  // Of the next frame.
+  double Next() {
+    const double value = value_;
+    value_ = kept_ * value_ + std::sqrt(1.0 - kept_ * kept_) * normal_(random_);
+    return value;
+  }
+
+ private:
+  const double kept_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  double value_;
+};
+
 class Tracker {
  public:
   Tracker(const Scenario& scenario, const SimulatedCamera& camera, const Scene& scene)
       : scenario_(scenario),
         camera_(camera),
         scene_(scene),
-        random_(MakeRandom(scenario.seed, kTrackStream)) {}
+        random_(MakeRandom(scenario.seed, kTrackStream)),
+        noise_wander_(scenario, TrackOptions::kNoiseMemoryS, kNoiseStream) {}
 
   void Step(const FrameTiming& frame, std::vector<TrackedPoint>* tracks,
             std::vector<PointTruth>* truths) {
+    noise_px_ =
+        scenario_.tracks.noise_px * std::exp(scenario_.tracks.noise_scatter * noise_wander_.Next());
     std::vector<Landmark> seen;
     for (Landmark& landmark : alive_) {
       const double mean_life = scenario_.tracks.mean_life_frames;
@@ -181,7 +207,7 @@ class Tracker {
 
     // A re-anchoring tracker defines its point in the first picture: no noise there.
     const TrackOptions& options = scenario_.tracks;
-    const Vector2d noise = Noise(options.noise_px), gross = Noise(options.outlier_px);
+    const Vector2d noise = Noise(noise_px_), gross = Noise(options.outlier_px);
     const bool defines = options.reanchored && is_new;
     truth.outlier = Unit() < options.outlier_fraction && !defines;
     Vector2d measured = truth.px;
@@ -201,31 +227,10 @@ class Tracker {
   const Scene& scene_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
+  Wander noise_wander_;
+  double noise_px_ = 0.0;        // of this frame
   std::vector<Landmark> alive_;  // by ascending id
   int64_t next_id_ = 0;
-};
-
-// The error of the frames' stamps that neighbours share.
-class StampWander {
- public:
-  explicit StampWander(const Scenario& scenario)
-      : wander_s_(scenario.effects.frame_stamp_jitter.wander_s),
-        kept_(std::exp(
-            -1.0 / (scenario.camera.rate_hz * scenario.effects.frame_stamp_jitter.wander_time_s))),
-        random_(MakeRandom(scenario.seed, kWanderStream)),
-        value_(normal_(random_)) {}
-  // Of the next frame [s].
-  double Next() {
-    const double error_s = wander_s_ * value_;
-    value_ = kept_ * value_ + std::sqrt(1.0 - kept_ * kept_) * normal_(random_);
-    return error_s;
-  }
-
- private:
-  const double wander_s_, kept_;
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  double value_;
 };
 
 void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated* result) {
@@ -235,7 +240,7 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
   std::normal_distribution<double> normal;
   std::exponential_distribution<double> latency;
   const FrameStampJitter& jitter = scenario.effects.frame_stamp_jitter;
-  StampWander wander(scenario);
+  Wander wander(scenario, jitter.wander_time_s, kWanderStream);
   const int count = static_cast<int>(std::floor(scenario.duration_s * options.rate_hz)) + 1;
   for (int i = 0; i < count; ++i) {
     const double time_s = scenario.margin_s + i / options.rate_hz;  // first row, clean clock
@@ -244,8 +249,8 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
     const int64_t exposure_ns = std::llround(1e9 * options.exposure_s * (1.0 + swing));
     const double exposure_s = 1e-9 * static_cast<double>(exposure_ns);
     const double late_s = jitter.latency_s > 0.0 ? jitter.latency_s * latency(random) : 0.0;
-    const int64_t jitter_ns =
-        std::llround(1e9 * (jitter.spread_s * normal(random) + late_s + wander.Next()));
+    const int64_t jitter_ns = std::llround(
+        1e9 * (jitter.spread_s * normal(random) + late_s + jitter.wander_s * wander.Next()));
     if (unit(random) < options.drop_fraction && i > 0 && i + 1 < count) continue;
 
     Frame frame;

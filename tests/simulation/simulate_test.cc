@@ -174,6 +174,33 @@ TEST(Tracks, ReanchoredNoiseSitsInTheSecondImage) {
   EXPECT_NEAR(std::sqrt(sum / count), 0.5, 0.01);
 }
 
+// As of pictures that are blurred and dark for a while.
+TEST(Tracks, NoiseScattersFromFrameToFrame) {
+  Scenario scenario;
+  scenario.duration_s = 40.0;
+  scenario.tracks.count = 200;
+  scenario.tracks.noise_px = 0.5;
+  scenario.tracks.noise_scatter = 0.4;
+  const Simulated s = SimulateTracks(scenario).value();
+  std::vector<double> logs;
+  for (size_t i = 0; i < s.points.size(); ++i) {
+    double sum = 0.0;
+    for (size_t k = 0; k < s.points[i].size(); ++k) {
+      sum += (s.recording.tracks[i][k].px - s.points[i][k].px).squaredNorm();
+    }
+    logs.push_back(0.5 * std::log(0.5 * sum / static_cast<double>(s.points[i].size())));
+  }
+  double mean = 0.0, square = 0.0, neighbours = 0.0;
+  for (const double log : logs) mean += log / static_cast<double>(logs.size());
+  for (size_t i = 1; i < logs.size(); ++i) {
+    square += (logs[i] - mean) * (logs[i] - mean);
+    neighbours += (logs[i] - mean) * (logs[i - 1] - mean);
+  }
+  EXPECT_NEAR(std::exp(mean), 0.5, 0.05);
+  EXPECT_NEAR(std::sqrt(square / static_cast<double>(logs.size())), 0.4, 0.05);
+  EXPECT_NEAR(neighbours / square, std::exp(-1.0 / (30.0 * TrackOptions::kNoiseMemoryS)), 0.05);
+}
+
 TEST(Tracks, OutliersMovingPointsAndLifeAreAsAsked) {
   Scenario scenario;
   scenario.duration_s = 20.0;
