@@ -265,7 +265,9 @@ class CalibrationJob {
       }
     }
     if (!refined) return tl::unexpected(refined.error());
+    TakeNoiseFactors(refined->noise_factors, &refined_pairs_);
     const Halves halves = LeaveOutWhatMoves(refinement, &*refined);
+    report_.noise_factors = refined->noise_factors;
     report_.calibration = refined->calibration;
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;

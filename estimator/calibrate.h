@@ -2,7 +2,9 @@
 #ifndef CAMGYRO_ESTIMATOR_CALIBRATE_H_
 #define CAMGYRO_ESTIMATOR_CALIBRATE_H_
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -72,6 +74,7 @@ struct CalibrationReport {
   int moving_tracks = 0;  // left out of the refinement (estimator/moving_tracks.h)
   // With frame_stamp_jitter: the frames' own times, by nanoseconds after the first gyro stamp.
   std::vector<FrameOffset> frame_times;
+  std::map<int64_t, double> noise_factors;  // Refined::noise_factors
   bool converged = false;
   // Where calibration.total_covariance comes from (estimator/diagnosis/model_check.h).
   std::string device_class;

@@ -19,8 +19,8 @@ void AddLeans(const EstimationInput& input, const TimedPair& pair, const Calibra
     return;
   }
   for (size_t i = 0; i < misfits.size(); ++i) {
-    leans->Add(view.measurement.matches[i].track_id, misfits[i].residual_px / noise,
-               misfits[i].correction_px);
+    leans->Add(view.measurement.matches[i].track_id,
+               misfits[i].residual_px / view.measurement.sigma, misfits[i].correction_px);
   }
 }
 

@@ -248,11 +248,12 @@ def quality_row(label, r):
     quality = r["quality"]
     if "noise_px" in quality:
         noise, rms = "%.3f px" % quality["noise_px"], "%.3f px" % quality["rms_px"]
+        scatter = "± %.0f %%" % (100 * quality["noise_scatter"])
     else:
-        noise, rms = "%.3f mrad" % (1e3 * quality["noise_rad"]), "-"
+        noise, rms, scatter = "%.3f mrad" % (1e3 * quality["noise_rad"]), "-", "-"
     unseen = "%.3f px" % quality["unseen_rms_px"] if "unseen_rms_px" in quality else "-"
-    return [label, noise, "%.0f %%" % (100 * quality["inlier_ratio"]), rms, unseen, r["frames_s"],
-            "%.0f" % r["cpu_s"]]
+    return [label, noise, scatter, "%.0f %%" % (100 * quality["inlier_ratio"]), rms, unseen,
+            r["frames_s"], "%.0f" % r["cpu_s"]]
 
 
 def online_row(label, known, r):
@@ -317,8 +318,8 @@ def tables(results):
             len(size), (size < 3).sum(), np.sqrt(np.mean(size**2)) if len(size) else np.nan)
         + "## Quality and time\n\nFrames/s: of the online pass, wall clock; CPU: of the whole "
         "command, tracking included.\n\n"
-        + table(["Recording", "Noise", "Inliers", "rms", "Unseen rms", "Frames/s", "CPU [s]"],
-                quality)
+        + table(["Recording", "Noise", "from pair to pair", "Inliers", "rms", "Unseen rms",
+                 "Frames/s", "CPU [s]"], quality)
         + "## Online estimate beside the refined one\n\nThe last window of the online pass ± its "
         "sigma; errors against what is known.\n\n"
         + table(["Recording", "f [px]", "t_r [ms]", "t_d [ms]", "q_c [deg]"], online)).rstrip("\n")

@@ -136,6 +136,9 @@ std::string StartLine(const StartResult& start) {
       1.0 / std::max(1e-3, start.runner_up_ratio));
 }
 
+// Below, a reader need not know. Of recordings of tracks without blur it is below 0.04.
+constexpr double kScatterWorthSaying = 0.1;
+
 std::string QualityLine(const CalibrationReport& report, bool attitudes) {
   const FitQuality& quality = report.quality;
   if (attitudes) {
@@ -146,6 +149,9 @@ std::string QualityLine(const CalibrationReport& report, bool attitudes) {
   // The online pass counts no matches.
   if (quality.matches > 0) line += Format(", %d matches", quality.matches);
   line += Format(", noise %.3f px", quality.noise_px);
+  if (quality.noise_scatter > kScatterWorthSaying) {
+    line += Format(" (%.0f %% more or less from pair to pair)", 100.0 * quality.noise_scatter);
+  }
   if (quality.inlier_ratio > 0.0) line += Format(", %.0f %% inliers", 100.0 * quality.inlier_ratio);
   if (quality.rms_px > 0.0) line += Format(", rms %.3f px", quality.rms_px);
   if (report.unseen) line += Format(", on unseen frames %.3f px", report.unseen->rms_px);

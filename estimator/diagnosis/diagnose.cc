@@ -154,6 +154,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
   if (!(input.noise > 0.0)) {
     input.noise = recording.HasOnlyAttitudes() ? kFirstNoiseRad : kFirstNoisePx;
   }
+  input.noise_factors = report.noise_factors;
   StageClock clock(&diagnosis.times);
   const Result<Calibration> found = FindEffects(input, options, progress, &diagnosis);
   clock.Finish("diagnosis");

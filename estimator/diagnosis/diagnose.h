@@ -3,7 +3,9 @@
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_DIAGNOSE_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_DIAGNOSE_H_
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -101,7 +103,8 @@ struct LoopInput {
   Calibration start;  // where it all began
   Prior prior;
   PairGraphOptions graph;
-  double noise = 1.0;  // first guess [px], attitudes [rad]
+  double noise = 1.0;                       // first guess [px], attitudes [rad]
+  std::map<int64_t, double> noise_factors;  // of the pairs that `fit` has used
 };
 Result<Calibration> FindEffects(const LoopInput& input, const DiagnoseOptions& options,
                                 const Progress& progress, Diagnosis* diagnosis);

@@ -73,7 +73,8 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
   t.candidates = std::move(with_columns);
   t.usual = UsualOf(t.candidates, recording, model, device);
 
-  const EstimationInput input = OutlineOf(recording, SelectPairs(recording));
+  EstimationInput input = OutlineOf(recording, SelectPairs(recording));
+  TakeNoiseFactors(report.noise_factors, &input.pairs);
   const Shares shares = MakeShares(recording, input, {kMostFitPairs, kMostFitPairs});
   const PairGraphOptions graph = GraphOptionsFor(recording, report.start, options);
   const auto scores_of = [&](const std::vector<PairBlock>& blocks) {

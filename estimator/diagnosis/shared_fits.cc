@@ -10,10 +10,20 @@
 
 namespace camgyro {
 
+namespace {
+
+EstimationInput OutlineWithNoise(const LoopInput& in) {
+  EstimationInput outline = OutlineOf(*in.recording, SelectPairs(*in.recording));
+  TakeNoiseFactors(in.noise_factors, &outline.pairs);
+  return outline;
+}
+
+}  // namespace
+
 SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
     : in_(in),
       options_(options),
-      input_(OutlineOf(*in.recording, SelectPairs(*in.recording))),
+      input_(OutlineWithNoise(in)),
       shares_(MakeShares(*in.recording, input_, {kMostFitPairs, kMostChoicePairs})) {
   const auto shares_of = [&](const PairSelection& selection, const ShareLimits& limits) {
     return MakeShares(*in.recording, OutlineOf(*in.recording, selection), limits);

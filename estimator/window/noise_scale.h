@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "core/recording.h"
 #include "estimator/window/estimation_input.h"
 #include "estimator/window/residuals/pair_residual.h"
 
@@ -31,6 +32,15 @@ class NoiseScale {
   // (s^2 + g) of a misfit with the variance s^2 + g, s being the scale and g the gyro's variance of
   // a turn.
   double Next(const std::vector<std::vector<double>>& residuals, double scale) const;
+  // How noisy each pair is in units of the scale, geometric mean 1. Pictures are blurred and dark
+  // for a while: on measured recordings the noise of pairs scatters by 10 to 50 % (`camgyro
+  // calibrate` prints it), in simulation by nothing. A pair's own scale is known only so well;
+  // what it has beyond that scatters over the recording by a variance that all pairs tell together,
+  // and each is taken as far as that makes it likely (empirical Bayes): all factors are 1 where
+  // pairs differ by chance only, and those of pairs with fewer than four. differences:
+  // NeighbourDifferences of each pair, in sigmas of scale and `now`.
+  std::vector<double> FactorsOfPairs(const std::vector<std::vector<double>>& differences,
+                                     const std::vector<double>& now) const;
   // By what factor the scale of matches changes.
   double Growth(const std::vector<std::vector<double>>& residuals, double scale) const;
 
@@ -39,6 +49,13 @@ class NoiseScale {
   double least_ = kLeastPx;
   double gyro_variance_ = 0.0;  // of a turn between attitudes, per axis [rad^2]; 0 with pixels
 };
+
+// Differences of the residuals of matches that are neighbours in the first picture, each match in
+// one of them, over sqrt(2): their noise. What a model lacks is smooth over the picture and
+// cancels, so that no pair hides it behind a noise of its own.
+// As many residuals as matches (CHECKed), or none.
+std::vector<double> NeighbourDifferences(const std::vector<Match>& matches,
+                                         const std::vector<double>& residuals);
 
 }  // namespace camgyro
 

@@ -90,6 +90,10 @@ class PairGraph {
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
   std::vector<int64_t> pair_ids() const;
 
+  // Those that have a residual, in its order.
+  const std::vector<Match>& MatchesOf(int64_t id) const {
+    return pairs_.at(id).measurement->matches;
+  }
   // PairResidual::Independent of a pair at the present estimate. With `search`, its direction is
   // first searched anew, and stored if it is better. Empty if a ray is missing.
   std::vector<double> Residuals(int64_t id, bool search) {

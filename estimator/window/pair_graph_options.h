@@ -13,8 +13,8 @@ namespace camgyro {
 struct PairGraphOptions {
   const PairResidual* residual = &ByPlane();  // of matches; attitudes have their own (ResidualOf)
   MatchNoise match_noise = MatchNoise::kBothImages;
-  // Noise of the pairs added from now on, per axis [px; rad of attitudes]; none: the residual's
-  // first guess.
+  // Noise of the pairs added from now on, per axis [px; rad of attitudes], but for each pair's own
+  // factor; none: the residual's first guess.
   std::optional<double> sigma;
   double first_sigma() const { return sigma.value_or(residual->facts().usual_sigma); }
   double robust_threshold = 2.5;  // in sigmas; 0: none

@@ -186,7 +186,7 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
   m.frame_a = pair.first().Moved(offsets_s[0]);
   m.frame_b = pair.second().Moved(offsets_s[1]);
   m.size_px << calibration.width_px, calibration.height_px;
-  m.sigma = noise;
+  m.sigma = noise * pair.noise_factor;
   m.noise = options.match_noise;
   m.robust_threshold = options.robust_threshold;
   m.lens = &GetLens(calibration.distortion_model);

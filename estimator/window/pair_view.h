@@ -32,7 +32,8 @@ struct PairPlane {
   Eigen::Vector3d DirectionOf(const PairMeasurement& pair, size_t i) const;
 };
 
-// False where the gyro's samples do not cover the pair. noise: pixels, or radians of attitudes.
+// False where the gyro's samples do not cover the pair. noise: of the recording, pixels, or radians
+// of attitudes; the pair's factor is applied.
 // Shutter, lens, effects and bias are the calibration's; matches are those that the residual of the
 // options has. offsets_s: of the frames' times from their stamps.
 [[nodiscard]] bool ViewPair(const EstimationInput& input, const TimedPair& pair,

@@ -57,18 +57,18 @@ class FitSum {
  public:
   FitSum(const PairGraphOptions& options, int per_match)
       : options_(options), per_match_(per_match) {}
-  // Independent residuals of some matches, in sigmas, without loss.
-  void Add(const std::vector<double>& residuals) {
+  // Independent residuals of a pair, in sigmas, without loss. factor: of its noise.
+  void Add(const std::vector<double>& residuals, double factor) {
     for (size_t i = 0; i < residuals.size(); i += static_cast<size_t>(per_match_)) {
       const double length = Eigen::Map<const Eigen::VectorXd>(&residuals[i], per_match_).norm();
       const double bounded = Robustify(length, options_.robust_threshold).value;
-      sum_sq_ += bounded * bounded;
+      sum_sq_ += factor * factor * bounded * bounded;
       inliers_ += length <= options_.inlier_sigmas() ? 1 : 0;
       ++matches_;
     }
   }
   int matches() const { return matches_; }
-  // Per residual.
+  // Per residual, in sigmas of a pair whose factor is 1.
   double rms() const { return std::sqrt(sum_sq_ / std::max(1, per_match_ * matches_)); }
   double inlier_ratio() const { return static_cast<double>(inliers_) / std::max(1, matches_); }
 
@@ -163,7 +163,7 @@ class Refinement {
                    .facts()),
         noise_(facts_, input, pairs, options.graph.gyro_sigma_rad_s) {
     if (!pairs.empty()) graph_options_.residual = &ResidualOf(pairs.front(), options.graph);
-    scale_ = graph_options_.first_sigma();
+    noise_now_.scale = graph_options_.first_sigma();
     result_.calibration = start;
   }
 
@@ -192,12 +192,12 @@ class Refinement {
       const bool spread_settled =
           UpdateFrameTimes(options_.settled_scale, graph_.get(), &result_.frame_times);
       const auto residuals = AllResiduals(/*search=*/false);
-      const double next_scale = noise_.Next(residuals, scale_);
+      const Noise next = NextNoise(residuals);
       result_.calibration = graph_->Estimate();
       const bool last = result_.rounds == options_.max_rounds;
-      scale_settled_ = SameScale(scale_, next_scale) && spread_settled;
+      scale_settled_ = SameNoise(next) && spread_settled;
       if (!scale_settled_ && !last) {
-        SetScale(next_scale);
+        SetNoise(next);
         continue;
       }
       // Where the next round would start from is not worth a covariance; the end is.
@@ -210,13 +210,17 @@ class Refinement {
       if (result_.converged) break;
     }
     result_.latents = std::make_shared<PairLatents>(graph_->Latents());
+    for (size_t i = 0; i < ids_.size(); ++i) result_.noise_factors[ids_[i]] = noise_now_.factors[i];
     return std::move(result_);
   }
 
  private:
   // The graph at the present calibration.
   Status Build() {
-    graph_options_.sigma = scale_;
+    std::map<int64_t, double> factors;
+    for (const TimedPair& pair : pairs_) factors[pair.id] = pair.noise_factor;
+    for (size_t i = 0; i < ids_.size(); ++i) factors[ids_[i]] = noise_now_.factors[i];
+    graph_options_.sigma = noise_now_.scale;
     built_at_ = result_.calibration;
     graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_,
                                          result_.rounds == 1 ? options_.latents : nullptr);
@@ -232,28 +236,63 @@ class Refinement {
                             " are needed): the others lack matches or gyro samples");
     }
     ids_ = graph_->pair_ids();
+    noise_now_.factors.clear();
+    for (const int64_t id : ids_) noise_now_.factors.push_back(factors.at(id));
+    SetNoise(noise_now_);
     return {};
   }
 
   // The scale at the start, misfit included, so that a poor start is not cut off by the loss;
   // directions depend on it.
   void FindFirstScale() {
-    const double searched_at = scale_;  // as the pairs were added
-    SetScale(noise_.Next(AllResiduals(/*search=*/false), scale_));
-    const bool same = SameScale(searched_at, scale_);
+    const Noise searched_at = noise_now_;  // as the pairs were added
+    SetScale(noise_.Next(AllResiduals(/*search=*/false), noise_now_.scale));
+    const bool same = SameNoise(searched_at);
     scale_settled_ = same && options_.latents != nullptr;
     if (facts_.of_attitudes || same) return;
-    SetScale(noise_.Next(AllResiduals(/*search=*/true), scale_));
+    SetScale(noise_.Next(AllResiduals(/*search=*/true), noise_now_.scale));
   }
 
-  bool SameScale(double before, double after) const {
-    return std::abs(after / before - 1.0) < options_.settled_scale;
+  // Of a pair: scale * factor.
+  struct Noise {
+    double scale = 1.0;
+    std::vector<double> factors;  // as ids_
+  };
+
+  // After a solve.
+  Noise NextNoise(std::vector<std::vector<double>> residuals) const {
+    Noise next;
+    next.factors = noise_now_.factors;
+    if (options_.find_noise_factors && facts_.has_direction) {
+      std::vector<std::vector<double>> differences(residuals.size());
+      ParallelFor(residuals.size(), [&](size_t i) {
+        differences[i] = NeighbourDifferences(graph_->MatchesOf(ids_[i]), residuals[i]);
+      });
+      next.factors = noise_.FactorsOfPairs(differences, next.factors);
+    }
+    for (size_t i = 0; i < residuals.size(); ++i) {
+      for (double& r : residuals[i]) r *= noise_now_.factors[i] / next.factors[i];
+    }
+    next.scale = noise_.Next(residuals, noise_now_.scale);
+    return next;
   }
 
-  void SetScale(double scale) {
-    scale_ = scale;
-    for (const int64_t id : ids_) graph_->SetSigma(id, scale_);
+  bool SameNoise(const Noise& other) const {
+    double changes_sq = 0.0;
+    for (size_t i = 0; i < ids_.size(); ++i) {
+      changes_sq += std::pow(std::log(other.factors[i] / noise_now_.factors[i]), 2);
+    }
+    return std::abs(other.scale / noise_now_.scale - 1.0) < options_.settled_scale &&
+           changes_sq < std::pow(options_.settled_scale, 2) * static_cast<double>(ids_.size());
   }
+
+  void SetNoise(const Noise& noise) {
+    noise_now_ = noise;
+    for (size_t i = 0; i < ids_.size(); ++i) {
+      graph_->SetSigma(ids_[i], noise_now_.scale * noise_now_.factors[i]);
+    }
+  }
+  void SetScale(double scale) { SetNoise({scale, noise_now_.factors}); }
 
   // Where the noise scale has settled, the state decides when to stop: the directions of pairs that
   // hardly determine theirs creep along flat valleys, for dozens of steps that move nothing else.
@@ -299,13 +338,16 @@ class Refinement {
       return known;
     }
     FitSum sum(graph_options_, facts_.per_match);
-    for (const auto& pair : residuals) sum.Add(pair);
+    for (size_t i = 0; i < residuals.size(); ++i) sum.Add(residuals[i], noise_now_.factors[i]);
     FitQuality& q = result_.quality;
     q = FitQuality();
     q.pairs = graph_->num_pairs();
-    q.noise_px = scale_;
+    q.noise_px = noise_now_.scale;
+    double scatter_sq = 0.0;
+    for (const double factor : noise_now_.factors) scatter_sq += std::pow(std::log(factor), 2);
+    q.noise_scatter = std::sqrt(scatter_sq / static_cast<double>(noise_now_.factors.size()));
     q.matches = sum.matches();
-    q.rms_px = scale_ * sum.rms();
+    q.rms_px = noise_now_.scale * sum.rms();
     q.inlier_ratio = sum.inlier_ratio();
     result_.converged =
         (moved.cwiseAbs().array() < options_.settled_round * result_.calibration.sigma().array())
@@ -323,7 +365,7 @@ class Refinement {
   std::unique_ptr<PairGraph> graph_;
   std::vector<int64_t> ids_;
   Calibration built_at_;
-  double scale_ = 1.0;
+  Noise noise_now_;
   bool scale_settled_ = false;
   std::optional<Yardstick> yardstick_;
   Refined result_;
@@ -337,6 +379,13 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
   Result<Refined> refined = Refinement(input, pairs, start, prior, options).Run();
   GiveBackFreeMemory();
   return refined;
+}
+
+void TakeNoiseFactors(const std::map<int64_t, double>& factors, std::vector<TimedPair>* pairs) {
+  for (TimedPair& pair : *pairs) {
+    const auto known = factors.find(pair.id);
+    if (known != factors.end()) pair.noise_factor = known->second;
+  }
 }
 
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
@@ -368,10 +417,10 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
       of_pairs[i] = std::move(residuals);
     }
   });
-  for (const auto& residuals : of_pairs) {
-    if (!residuals) continue;
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    if (!of_pairs[i]) continue;
     ++fit.pairs;
-    sum.Add(*residuals);
+    sum.Add(*of_pairs[i], pairs[i].noise_factor);
   }
   fit.matches = sum.matches();
   fit.rms_px = noise_px * sum.rms();

@@ -2,7 +2,9 @@
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,10 +29,13 @@ struct RefinementOptions {
   // It has settled when a round, with its new directions, has moved the state by less than this, in
   // sigmas (Mahalanobis distance, and each parameter by itself).
   double settled_round = 0.3;
-  // The scale of the noise, and the spread of the frames' times, have settled when a round has
-  // changed them by less than this share. Of that size is the error of all sigmas.
+  // The scale of the noise, the pairs' factors (root mean square) and the spread of the frames'
+  // times have settled when a round has changed them by less than this share. Of that size is the
+  // error of all sigmas.
   double settled_scale = 0.03;
   double cluster_s = 2.0;  // stretches of the clustered covariance
+  // The pairs' factors are found; false: they stay as they are.
+  bool find_noise_factors = true;
   // Of a fit that has settled, whose result and noise this one starts from; null: of none.
   std::shared_ptr<const PairLatents> latents;
 };
@@ -40,7 +45,9 @@ struct FitQuality {
   int matches = 0;            // in them
   double inlier_ratio = 0.0;  // share of matches within PairGraphOptions::inlier_sigmas
   double noise_px = 0.0;      // robust standard deviation per axis (attitudes: rad)
-  double rms_px = 0.0;        // of residuals, each bounded by the loss
+  // How that scatters from pair to pair: rms of the logarithms of the pairs' factors.
+  double noise_scatter = 0.0;
+  double rms_px = 0.0;  // of residuals, each bounded by the loss
 };
 
 struct Refined {
@@ -53,6 +60,7 @@ struct Refined {
   std::vector<FrameOffset> frame_times;
   FrameWander frame_wander;  // of these
   std::shared_ptr<const PairLatents> latents;
+  std::map<int64_t, double> noise_factors;  // TimedPair::noise_factor of the pairs used, by id
 };
 
 // Fits all `pairs` of the input. start: values with effects.
@@ -60,6 +68,9 @@ struct Refined {
 Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                        const Calibration& start, const Prior& prior,
                        const RefinementOptions& options);
+
+// Gives pairs the noise that a fit has found for them; those that it has not keep theirs.
+void TakeNoiseFactors(const std::map<int64_t, double>& factors, std::vector<TimedPair>* pairs);
 
 // A fit with those effects made anew that depend on the calibration, and refitted, until it stays
 // within a tenth of a sigma: what is left to gain by that would be taken for another effect's.

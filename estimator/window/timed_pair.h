@@ -29,6 +29,8 @@ struct TimedPair {
   std::vector<Match> matches;  // empty for rotations, and of an outline (OutlineOf)
   size_t num_matches = 0;      // of the recording, also where `matches` is empty
   CameraRotation rotation;     // of recordings with attitudes
+  // Of its matches, in units of what the recording has: NoiseScale::FactorsOfPairs.
+  double noise_factor = 1.0;
 
   FrameTime first() const { return {time_a_s, exposure_a_s}; }
   FrameTime second() const { return {time_b_s, exposure_b_s}; }

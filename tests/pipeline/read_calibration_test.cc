@@ -106,7 +106,7 @@ TEST_F(ReadCalibrationTest, AReportIsReadBackToBeCombined) {
   report.prior.sigma = StateVector::LinSpaced(1.0, 11.0);
   report.device_class = "phone";
   report.systematic = {{"gyro_scale", StateVector::LinSpaced(0.0, 1.0)}};
-  report.quality = {100, 5000, 0.75, 0.5, 0.625};
+  report.quality = {100, 5000, 0.75, 0.5, 0.25, 0.625};
   const std::string yaml = CalibrationYaml(report, /*attitudes=*/false);
   const auto read_report = [&](const std::string& text) {
     std::ofstream(Path("c.yaml")) << text;

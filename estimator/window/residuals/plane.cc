@@ -56,7 +56,7 @@ class Plane final : public PairResidual {
     for (size_t i = 0; i < view->bearings.a.size(); ++i) {
       const double sigmas = ResidualOf(*view, plane, i).value;
       MatchMisfit misfit;
-      misfit.residual_px = sigmas * noise;
+      misfit.residual_px = sigmas * view->measurement.sigma;
       misfit.inlier = std::abs(sigmas) <= options.inlier_sigmas();
       misfit.correction_px = CorrectionOf(*view, plane, i);
       misfits->push_back(misfit);

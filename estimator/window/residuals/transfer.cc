@@ -51,8 +51,8 @@ class ByRotationAlone final : public PairResidual {
     misfits->clear();
     for (size_t i = 0; i < residuals.size(); i += 2) {
       const Eigen::Vector2d two(residuals[i], residuals[i + 1]);
-      misfits->push_back({kMedianOfOne * two.norm() * noise, -sigma_of_two_px * two,
-                          two.norm() <= options.inlier_sigmas()});
+      misfits->push_back({kMedianOfOne * two.norm() * view->measurement.sigma,
+                          -sigma_of_two_px * two, two.norm() <= options.inlier_sigmas()});
     }
     return true;
   }

@@ -51,6 +51,47 @@ TEST(Refinement, RecoversTheTruth) {
   }
 }
 
+// Pictures that are blurred for a while: each pair has its noise, which is found, and the state is
+// better for it.
+TEST(Refinement, WeighsPairsByTheirNoise) {
+  double errors[2] = {0.0, 0.0};  // all alike, each its own
+  for (const uint64_t seed : {1, 2, 3, 4}) {
+    Scenario scenario = ShortScenario(8.0);
+    scenario.seed = seed;
+    scenario.tracks.noise_scatter = 0.6;
+    const Simulated s = SimulateTracks(scenario).value();
+    const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+    const Prior start = StartOffTheTruth(s.truth);
+    for (const bool find : {false, true}) {
+      RefinementOptions options;
+      options.find_noise_factors = find;
+      const Result<Refined> refined = Refine(input, input.pairs, start.mean, start, options);
+      ASSERT_TRUE(refined.has_value()) << refined.error().message;
+      errors[find ? 1 : 0] += ErrorInSigmas(refined->calibration, s.truth).squaredNorm();
+      if (!find) {
+        EXPECT_EQ(refined->quality.noise_scatter, 0.0);
+        continue;
+      }
+      EXPECT_NEAR(refined->quality.noise_scatter, 0.5, 0.15);  // of two pictures: less than 0.6
+      double error_sq = 0.0;
+      for (const TimedPair& pair : input.pairs) {
+        double sum = 0.0;
+        int count = 0;
+        for (const int frame : {pair.frame_a, pair.frame_b}) {
+          const auto f = static_cast<size_t>(frame);
+          for (size_t k = 0; k < s.points[f].size(); ++k, ++count) {
+            sum += (s.recording.tracks[f][k].px - s.points[f][k].px).squaredNorm();
+          }
+        }
+        const double noise_px = refined->quality.noise_px * refined->noise_factors.at(pair.id);
+        error_sq += std::pow(std::log(noise_px / std::sqrt(0.5 * sum / count)), 2);
+      }
+      EXPECT_LT(std::sqrt(error_sq / static_cast<double>(input.pairs.size())), 0.25);
+    }
+  }
+  EXPECT_LT(errors[1], 0.8 * errors[0]);
+}
+
 // Stamps that scatter by 2 ms: with times of their own the frames are where they were, and the
 // calibration is right within its sigmas; without, neither. A recording without jitter shows none.
 TEST(Refinement, FramesHaveTimesOfTheirOwn) {
