@@ -14,20 +14,36 @@ constexpr double kSettledRound = 5.0;
 // A chi-square per parameter that is to be near 1 or not needs no better sigmas than these.
 constexpr double kSettledScale = 0.1;
 
-// How the two halves of a recording disagree, in view of their covariances: chi-square per
-// parameter of the difference. 1 for a right model; what a constant model leaves out, and moves,
-// shows here.
-double HalvesChi2(const Calibration& first, const Calibration& second) {
-  const StateVector d = Difference(first, second);
-  const StateCovariance sum = first.covariance + second.covariance;
+// A half whose focal length differs from the whole's by this factor has run away: it cannot tell
+// its lens alone (with a fisheye that nothing declares, one went to 10 px), and says nothing of the
+// whole.
+constexpr double kRunAway = 2.0;
+
+bool HasRunAway(const Calibration& half, const Calibration& whole) {
+  const double ratio = half.lens[kFocal] / whole.lens[kFocal];
+  return !(ratio < kRunAway && ratio > 1.0 / kRunAway);
+}
+
+// Chi-square per parameter of a difference of states.
+double Chi2PerParameter(const StateVector& d, const StateCovariance& covariance) {
   // Unit diagonal before the factorisation: the units differ by orders of magnitude.
-  const StateVector scale = sum.diagonal().cwiseSqrt().cwiseInverse();
-  const StateCovariance correlation = scale.asDiagonal() * sum * scale.asDiagonal();
+  const StateVector scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const StateCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
   const StateVector z = scale.cwiseProduct(d);
   return z.dot(correlation.ldlt().solve(z)) / kStateSize;
 }
 
 }  // namespace
+
+double HalvesChi2(const Calibration& first, const Calibration& second, const Calibration& whole) {
+  const bool first_away = HasRunAway(first, whole), second_away = HasRunAway(second, whole);
+  if (first_away && second_away) return 0.0;
+  if (!first_away && !second_away) {
+    return Chi2PerParameter(Difference(first, second), first.covariance + second.covariance);
+  }
+  const Calibration& half = first_away ? second : first;
+  return Chi2PerParameter(Difference(half, whole), 0.5 * half.covariance);
+}
 
 HalvesFit::HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                      const Refined& whole, const Prior& prior, const RefinementOptions& refinement)
@@ -47,6 +63,8 @@ void HalvesFit::Fit(size_t half) {
   options.cluster_s = 0.5 * refinement_.cluster_s;
   options.graph.sigma = whole_.quality.noise_px;
   options.latents = whole_.latents;
+  // A half that runs away would find much noise where the whole fits, and run on.
+  options.find_noise_factors = false;
   const Result<Refined> fit = Refine(input_, halves_.at(half), whole_.calibration, prior_, options);
   if (!fit) return;
   fits_.at(half) = fit->calibration;
@@ -68,7 +86,8 @@ Halves HalvesFit::Compare() const {
   }
   Halves result;
   if (unseen.matches > 0) result.unseen = unseen;
-  if (fits_[0] && fits_[1]) result.chi2 = HalvesChi2(*fits_[0], *fits_[1]);
+  if (!fits_[0] || !fits_[1]) return result;
+  result.chi2 = HalvesChi2(*fits_[0], *fits_[1], whole_.calibration);
   return result;
 }
 

@@ -20,8 +20,16 @@ constexpr double kHalvesLimit = 31.3 / kStateSize;
 // How the doubt begins that says so.
 constexpr char kHalvesDoubt[] = "the two halves of the recording disagree beyond their noise";
 
+// How two halves disagree, in view of their covariances: chi-square per parameter of their
+// difference. 1 for a right model; what a constant model leaves out, and moves, shows here. Where
+// one of them alone has run away with its lens, it says nothing of the whole: then of the other one
+// and the whole, which knows what that half knows, and as much again, so that their difference has
+// half of the half's covariance (that of the half less that of the whole, Hausman 1978). 0 if both
+// have run away.
+double HalvesChi2(const Calibration& first, const Calibration& second, const Calibration& whole);
+
 struct Halves {
-  double chi2 = 0.0;  // HalvesChi2, 0 if a half cannot be fitted
+  double chi2 = 0.0;  // HalvesChi2; 0 if a half cannot be fitted
   std::optional<UnseenFit> unseen;
 };
 
