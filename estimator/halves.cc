@@ -36,9 +36,8 @@ double Chi2PerParameter(const StateVector& d, const StateCovariance& covariance)
 }  // namespace
 
 double HalvesChi2(const Calibration& first, const Calibration& second, const Calibration& whole) {
-  const bool first_away = HasRunAway(first, whole), second_away = HasRunAway(second, whole);
-  if (first_away && second_away) return 0.0;
-  if (!first_away && !second_away) {
+  const bool first_away = HasRunAway(first, whole);
+  if (first_away == HasRunAway(second, whole)) {
     return Chi2PerParameter(Difference(first, second), first.covariance + second.covariance);
   }
   const Calibration& half = first_away ? second : first;

@@ -24,8 +24,8 @@ constexpr char kHalvesDoubt[] = "the two halves of the recording disagree beyond
 // difference. 1 for a right model; what a constant model leaves out, and moves, shows here. Where
 // one of them alone has run away with its lens, it says nothing of the whole: then of the other one
 // and the whole, which knows what that half knows, and as much again, so that their difference has
-// half of the half's covariance (that of the half less that of the whole, Hausman 1978). 0 if both
-// have run away.
+// half of the half's covariance (that of the half less that of the whole, Hausman 1978). Two that
+// have run away are compared with each other.
 double HalvesChi2(const Calibration& first, const Calibration& second, const Calibration& whole);
 
 struct Halves {

@@ -27,7 +27,12 @@ TEST(HalvesChi2, LeavesOutAHalfThatHasRunAway) {
   const Calibration whole = AtFocal(500.0, 1.4), away = AtFocal(10.0, 4.0);
   EXPECT_NEAR(HalvesChi2(away, AtFocal(520.0, 2.0), whole), 200.0 / kStateSize, 1e-9);
   EXPECT_NEAR(HalvesChi2(AtFocal(520.0, 2.0), away, whole), 200.0 / kStateSize, 1e-9);
-  EXPECT_EQ(HalvesChi2(away, AtFocal(4000.0, 2.0), whole), 0.0);
+}
+
+// So that a whole whose halves lead nowhere is not taken for right.
+TEST(HalvesChi2, OfTwoThatHaveRunAwayIsLarge) {
+  const Calibration whole = AtFocal(500.0, 1.4);
+  EXPECT_GT(HalvesChi2(AtFocal(10.0, 4.0), AtFocal(4000.0, 3.0), whole), kHalvesLimit);
 }
 
 }  // namespace
