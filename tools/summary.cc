@@ -136,7 +136,8 @@ std::string StartLine(const StartResult& start) {
       1.0 / std::max(1e-3, start.runner_up_ratio));
 }
 
-// Below, a reader need not know. Of recordings of tracks without blur it is below 0.04.
+// Below, a reader need not know: in docs/lab/measured.md it is 0.07 at most where pairs are equally
+// noisy and the lens is in the model.
 constexpr double kScatterWorthSaying = 0.1;
 
 std::string QualityLine(const CalibrationReport& report, bool attitudes) {
