@@ -8,6 +8,7 @@
 
 #include "core/format.h"
 #include "core/parallel.h"
+#include "estimator/astray.h"
 #include "estimator/doubts.h"
 #include "estimator/gyro_clock.h"
 #include "estimator/halves.h"
@@ -84,6 +85,9 @@ class CalibrationJob {
     if (const Status found = Start(rotations_at); !found) return tl::unexpected(found.error());
     if (!attitudes_ && options_.online) {
       if (const Status done = Window(); !done) return tl::unexpected(done.error());
+      if (options_.try_what_leads_astray && options_.refine && IsAstray()) {
+        if (auto better = CalibrateWithWhatLeadsAstray(rotations_at)) return *std::move(better);
+      }
     }
     if (!options_.refine) {
       if (const Status done = FinishWindow(); !done) return tl::unexpected(done.error());
@@ -98,7 +102,10 @@ class CalibrationJob {
     }
     AddGyroClock(recording_, &report_.calibration);
     MarkDetermined(attitudes_, report_.prior, &report_.calibration);
-    if (!report_.converged) {  // delay and bias come from rates; the rest needs the fit
+    // Delay and bias come from rates; the rest needs a fit that has settled, at a lens like the
+    // start's.
+    if (!report_.converged ||
+        IsFarFromRotations(report_.calibration.lens[kFocal], report_.start.focal)) {
       for (size_t i = 0; i < kStateSize; ++i) {
         if (StateTable()[i].needs_fit) report_.calibration.determined[i] = false;
       }
@@ -168,6 +175,52 @@ class CalibrationJob {
     }
     clock_.Finish("window");
     return {};
+  }
+
+  // The focal length of the online estimate has left that of the start. What a fit of all pairs
+  // makes of it would take minutes, and be wrong.
+  bool IsAstray() const {
+    return online_noise_ && (IsFarFromRotations(estimate_.lens[kFocal], report_.start.focal) ||
+                             RanAway(estimate_.lens[kFocal], from_start_.lens[kFocal]));
+  }
+
+  // The calibration with the first effect that leads fits astray and that the data bear out: its
+  // focal length is near the start's, it has less noise than the online estimate without the
+  // effect, and values of it that are like those of real devices, and not zero.
+  std::optional<CalibrationReport> CalibrateWithWhatLeadsAstray(
+      const CameraRotationsAt& rotations_at) const {
+    const double begin_px = from_start_.lens[kFocal];
+    for (const EffectEntry& entry : EffectCatalogue()) {
+      if (!entry.leads_astray || !report_.residual->facts().with_effects ||
+          (from_start_.effects != nullptr && from_start_.effects->Has(entry.name))) {
+        continue;
+      }
+      CalibrateOptions with = options_;
+      with.effects += (with.effects.empty() ? "" : ",") + entry.name;
+      with.given_start = report_.start;
+      with.try_what_leads_astray = false;
+      Result<CalibrationReport> fit = CalibrationJob(recording_, with, progress_).Run(rotations_at);
+      if (!fit) continue;
+      const Calibration& c = fit->calibration;
+      const auto& items = c.effects->items();
+      const auto item = std::find_if(items.begin(), items.end(),
+                                     [&](const auto& i) { return i.entry->name == entry.name; });
+      if (IsFarFromRotations(c.lens[kFocal], report_.start.focal) ||
+          !Implausible(*item, c, begin_px).empty() || !IsSeen(*item, c) ||
+          !(fit->quality.noise_px < *online_noise_)) {
+        continue;
+      }
+      fit->notes.push_back(Format(
+          "%s is fitted as well, although nobody asked for it: without it the focal length ran "
+          "from %.0f to %.0f px online, and the noise was %.2f instead of %.2f px; %s",
+          entry.name.c_str(), begin_px, estimate_.lens[kFocal], *online_noise_,
+          fit->quality.noise_px, entry.advice.c_str()));
+      for (size_t i = 0; i < report_.times.size(); ++i) {  // of the fit that went astray, too
+        fit->times[i].seconds += report_.times[i].seconds;
+      }
+      return *std::move(fit);
+    }
+    return std::nullopt;
   }
 
   // All of the online pass.

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "core/format.h"
 #include "core/state.h"
+#include "estimator/astray.h"
 
 namespace camgyro {
 namespace {
@@ -18,18 +18,6 @@ bool FocalRanAway(bool attitudes, const Calibration& c) {
   const double diagonal_px = std::hypot(c.width_px, c.height_px);
   return !attitudes && !(c.lens[kFocal] > kShortestFocal * diagonal_px &&
                          c.lens[kFocal] < kLongestFocal * diagonal_px);
-}
-
-// How far the focal length of a fit may be from that of the rotations at the start (log), and in
-// sigmas of the latter: a strong lens that nothing declares moves the start's by 7 % (rms,
-// docs/lab/start.md), and a fit's by any factor.
-constexpr double kFarFromStart = 0.2, kFarFromStartSigmas = 5.0;
-
-bool FocalIsFarFromStart(const std::optional<StartFocal>& start, const Calibration& c) {
-  if (!start || !start->determined) return false;
-  const double apart = std::abs(std::log(c.lens[kFocal] / start->value_px));
-  return !(apart <
-           std::max(kFarFromStart, kFarFromStartSigmas * start->sigma_px / start->value_px));
 }
 
 }  // namespace
@@ -65,7 +53,7 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
         "row",
         c.lens[kFocal], 1e3 * report->start.delay_middle_row_s));
   }
-  if (FocalIsFarFromStart(report->start.focal, c)) {
+  if (IsFarFromRotations(c.lens[kFocal], report->start.focal)) {
     report->doubts.push_back(Format(
         "the focal length of the fit, %.0f px, is far from the %.0f ± %.0f px of the rotations at "
         "the start: it makes up for something that the lens has and the model lacks; try "

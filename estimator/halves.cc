@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/astray.h"
+
 namespace camgyro {
 namespace {
 
@@ -13,16 +15,6 @@ namespace {
 constexpr double kSettledRound = 5.0;
 // A chi-square per parameter that is to be near 1 or not needs no better sigmas than these.
 constexpr double kSettledScale = 0.1;
-
-// A half whose focal length differs from the whole's by this factor has run away: it cannot tell
-// its lens alone (with a fisheye that nothing declares, one went to 10 px), and says nothing of the
-// whole.
-constexpr double kRunAway = 2.0;
-
-bool HasRunAway(const Calibration& half, const Calibration& whole) {
-  const double ratio = half.lens[kFocal] / whole.lens[kFocal];
-  return !(ratio < kRunAway && ratio > 1.0 / kRunAway);
-}
 
 // Chi-square per parameter of a difference of states.
 double Chi2PerParameter(const StateVector& d, const StateCovariance& covariance) {
@@ -36,8 +28,9 @@ double Chi2PerParameter(const StateVector& d, const StateCovariance& covariance)
 }  // namespace
 
 double HalvesChi2(const Calibration& first, const Calibration& second, const Calibration& whole) {
-  const bool first_away = HasRunAway(first, whole);
-  if (first_away == HasRunAway(second, whole)) {
+  // A half that has run away cannot tell its lens alone, and says nothing of the whole.
+  const bool first_away = RanAway(first.lens[kFocal], whole.lens[kFocal]);
+  if (first_away == RanAway(second.lens[kFocal], whole.lens[kFocal])) {
     return Chi2PerParameter(Difference(first, second), first.covariance + second.covariance);
   }
   const Calibration& half = first_away ? second : first;

@@ -1,12 +1,12 @@
 #include "estimator/diagnosis/contest.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/parallel.h"
+#include "estimator/astray.h"
 #include "estimator/diagnosis/gain_rule.h"
 #include "estimator/diagnosis/thresholds.h"
 
@@ -18,6 +18,11 @@ struct Rival {
   Refined fit;
   std::vector<double> gain;  // by block of the choice share
 };
+
+// By the effect that was added last.
+std::string ImplausibleByItsLast(const Calibration& fit, double start_focal_px) {
+  return Implausible(fit.effects->items().back(), fit, start_focal_px);
+}
 
 class Contest {
  public:
@@ -109,7 +114,7 @@ class Contest {
     AddEffect(candidate, &start);
     const Result<Refined> fit = fits_.Fit(start, noise_);
     if (!fit) return std::nullopt;
-    r.rejected = Implausible(fit->calibration, fits_.in().start.lens[kFocal]);
+    r.rejected = ImplausibleByItsLast(fit->calibration, fits_.in().start.lens[kFocal]);
     if (!r.rejected.empty()) return std::nullopt;
     r.refitted = true;
     return Rival{i, *fit, LatentGain(choice_)};
@@ -128,7 +133,7 @@ class Contest {
     AddEffect(candidate, &anew);
     const Result<Refined> other = fits_.Fit(anew, fits_.in().noise);
     const auto rank = [&](const Refined& f) {
-      return std::pair(!Implausible(f.calibration, fits_.in().start.lens[kFocal]).empty(),
+      return std::pair(!ImplausibleByItsLast(f.calibration, fits_.in().start.lens[kFocal]).empty(),
                        f.quality.rms_px);
     };
     if (other && (!fit || rank(*other) < rank(*fit))) fit = other;
@@ -163,7 +168,7 @@ class Contest {
 
   // Empty: nothing speaks against it.
   std::string WhyNot(const CandidateResult& r, const Calibration& fit) const {
-    std::string implausible = Implausible(fit, fits_.in().start.lens[kFocal]);
+    std::string implausible = ImplausibleByItsLast(fit, fits_.in().start.lens[kFocal]);
     if (!implausible.empty()) return implausible;
     if (!GainBearsOut(r, static_cast<double>(all_.size()))) {
       return "no gain on unseen frames beyond its noise";
@@ -225,23 +230,6 @@ std::optional<ContestResult> RunLastResort(const ContestSetting& setting,
                                            std::vector<Contestant>* contestants) {
   if (contestants->empty()) return std::nullopt;
   return Contest(setting, contestants).RunLastResort();
-}
-
-std::string Implausible(const Calibration& fit, double start_focal_px) {
-  const EffectSet::Item& item = fit.effects->items().back();
-  for (int k = 0; k < item.effect->size(); ++k) {
-    const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
-    const double value = fit.effect_values[item.first + k];
-    const double sigma = std::sqrt(fit.effect_covariance(item.first + k, item.first + k));
-    if (value < p.plausible_min - kImplausibleSigmas * sigma ||
-        value > p.plausible_max + kImplausibleSigmas * sigma) {
-      return p.name + " outside of what real devices show";
-    }
-  }
-  if (std::abs(std::log(fit.lens[kFocal] / start_focal_px)) > std::log(kRunAwayFocal)) {
-    return "the fit runs away with it";
-  }
-  return "";
 }
 
 double PValueOfFit(const Calibration& fit, double inflation, double gain) {

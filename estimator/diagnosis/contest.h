@@ -42,9 +42,6 @@ std::optional<ContestResult> RunContest(const ContestSetting& setting,
 std::optional<ContestResult> RunLastResort(const ContestSetting& setting,
                                            std::vector<Contestant>* contestants);
 
-// Why a fit cannot be right, by its last effect and by its focal length; empty: it can.
-std::string Implausible(const Calibration& fit, double start_focal_px);
-
 // Of the last effect's parameters being all zero, by both shares: Wald's statistic of the fit share
 // and the gain in the choice share. If the best parameters are a of one and b of the other, in
 // sigmas, the two are a^2 and at most 2ab - a^2, so that their sum is bounded by a^2 + b^2, chi2

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/usual_focal.h"
+#include "estimator/astray.h"
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
 
@@ -33,15 +34,6 @@ void AddUnique(const std::string& name, std::vector<std::string>* names) {
   if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
 }
 
-// Beyond noise in the fit of all frames.
-bool IsSeen(const EffectSet::Item& item, const Calibration& c) {
-  const auto n = item.effect->size();
-  const Eigen::VectorXd sigma =
-      c.effect_covariance.diagonal().segment(item.first, n).cwiseMax(0.0).cwiseSqrt();
-  return (c.effect_values.segment(item.first, n).cwiseAbs().array() > kSeenSigmas * sigma.array())
-      .any();
-}
-
 // Effects that are in the model from the start on, as findings, where the fit sees them, too.
 void AddFoundAtStart(const CalibrationReport& report, Diagnosis* diagnosis) {
   const Calibration& c = report.calibration;
@@ -60,12 +52,15 @@ Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAt& rotations_a
                                             const CalibrateOptions& options,
                                             const Progress& progress, Recording* recording,
                                             std::vector<DataFault>* faults) {
+  // The loop finds what leads fits astray by itself, and shows what it gains in unseen frames.
+  CalibrateOptions plain = options;
+  plain.try_what_leads_astray = false;
   Result<CalibrationReport> report =
-      CalibrateRecording(*recording, rotations_at, options, Part(progress, 0.0, 1.0));
+      CalibrateRecording(*recording, rotations_at, plain, Part(progress, 0.0, 1.0));
   if (report || report.error().kind != ErrorKind::kCannotEstimate) return report;
   if (const auto repaired = RepairGyro(rotations_at, options.start, recording)) {
     faults->push_back(*repaired);
-    return CalibrateRecording(*recording, rotations_at, options, progress);
+    return CalibrateRecording(*recording, rotations_at, plain, progress);
   }
   const std::vector<CameraRotation> rotations = CameraRotationsIn(*recording, rotations_at);
   std::optional<std::string> found = FindElectronicStabilisation(*recording, rotations);

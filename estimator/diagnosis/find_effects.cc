@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "estimator/astray.h"
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/contest.h"
 #include "estimator/diagnosis/diagnose.h"

@@ -64,11 +64,6 @@ constexpr double kLeastGainOfRival = 0.25;
 constexpr double kStrongMisfit = 0.02;
 // One with fewer parameters wins if it is behind by less than so many sigmas of the difference.
 constexpr double kBehindSigmas = 2.0;
-// Beyond the range of real devices by more than so many of its sigmas, a fit is not believed.
-constexpr double kImplausibleSigmas = 2.0;
-// Factor of the focal length beyond which a fit runs away with an effect
-// (FindEffects.NamesNothingWithAFocalLengthThatRanAway).
-constexpr double kRunAwayFocal = 2.0;
 // The plain fit is astray: its focal length has changed by this part, its centre by this part of
 // the diagonal. (Real centres stay within 3 % of the diagonal.)
 constexpr double kAstrayFocal = 0.15, kAstrayCentre = 0.05;
@@ -118,9 +113,6 @@ constexpr double kRestP = 0.01, kLeastShareOfTimes = 0.75;
 constexpr double kLeastNearSpread = 0.5;
 
 // ---- What the verdict says beside effects ----
-
-// Sigmas beyond which the fit bears out an effect that the start has put into the model.
-constexpr double kSeenSigmas = 3.0;
 
 // A factor of the sigmas below this one is no doubt, and would be printed as 1.0 (model_check.cc).
 constexpr double kLeastFactorSaid = 1.05;

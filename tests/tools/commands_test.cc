@@ -305,6 +305,22 @@ TEST_F(CommandsTest, CalibrateMeasuredLensFromTheStart) {
   EXPECT_NEAR(camera["distortion"]["value"][0].as<double>(), -0.28, 0.02);
 }
 
+// The same lens on a drone, and on a simulated camera in the hand with a rolling shutter, at the
+// first try: f published as 457.3 and 459.4 px.
+TEST_F(CommandsTest, CalibrateMeasuredLensThatNobodyDeclares) {
+  for (const char* name : {"euroc-v101-flight", "ov_handheld_rs"}) {
+    const auto recording = MeasuredData(name);
+    if (!recording) GTEST_SKIP() << "*** SKIPPED: no measured recording " << name;
+    const RunResult run = Run("calibrate " + *recording + " --out=result --require=focal,delay");
+    ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
+    EXPECT_THAT(run.out, HasSubstr("radial_distortion is fitted as well"));
+    const YAML::Node focal = YAML::LoadFile(Path("result/calibration.yaml"))["camera"]["focal_px"];
+    EXPECT_NEAR(focal["value"].as<double>(), 458.35,
+                1.05 + 3.0 * focal["sigma_total"].as<double>());
+    EXPECT_LT(focal["sigma_total"].as<double>(), 6.0);
+  }
+}
+
 // Measured: a drone's lens that nothing declares. The plain fit runs away to an f of some 4500 px;
 // with the lens, frames that no fit has seen have less than half of the residual.
 TEST_F(CommandsTest, DiagnoseMeasuredLens) {

@@ -1,0 +1,56 @@
+#include "estimator/astray.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace camgyro {
+namespace {
+
+// Factor of the focal length beyond which a fit has run away: with a fisheye that nothing declares,
+// half of a recording went to 10 px (FindEffects.NamesNothingWithAFocalLengthThatRanAway).
+constexpr double kRunAwayFocal = 2.0;
+
+// How far the focal length of a fit may be from that of the rotations at the start (log), and in
+// sigmas of the latter.
+constexpr double kFarFromStart = 0.2, kFarFromStartSigmas = 5.0;
+
+// Sigmas beyond which a fit bears out an effect that nobody has asked for.
+constexpr double kSeenSigmas = 3.0;
+
+}  // namespace
+
+// Written so that what is no number has run away, and is far.
+bool RanAway(double focal_px, double from_px) {
+  return !(std::abs(std::log(focal_px / from_px)) <= std::log(kRunAwayFocal));
+}
+
+bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start) {
+  if (!start || !start->determined) return false;
+  const double apart = std::abs(std::log(focal_px / start->value_px));
+  return !(apart <
+           std::max(kFarFromStart, kFarFromStartSigmas * start->sigma_px / start->value_px));
+}
+
+std::string Implausible(const EffectSet::Item& item, const Calibration& fit,
+                        double start_focal_px) {
+  for (int k = 0; k < item.effect->size(); ++k) {
+    const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+    const double value = fit.effect_values[item.first + k];
+    const double sigma = std::sqrt(fit.effect_covariance(item.first + k, item.first + k));
+    if (value < p.plausible_min - kImplausibleSigmas * sigma ||
+        value > p.plausible_max + kImplausibleSigmas * sigma) {
+      return p.name + " outside of what real devices show";
+    }
+  }
+  return RanAway(fit.lens[kFocal], start_focal_px) ? "the fit runs away with it" : "";
+}
+
+bool IsSeen(const EffectSet::Item& item, const Calibration& fit) {
+  const auto n = item.effect->size();
+  const Eigen::VectorXd sigma =
+      fit.effect_covariance.diagonal().segment(item.first, n).cwiseMax(0.0).cwiseSqrt();
+  return (fit.effect_values.segment(item.first, n).cwiseAbs().array() > kSeenSigmas * sigma.array())
+      .any();
+}
+
+}  // namespace camgyro

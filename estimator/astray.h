@@ -1,0 +1,33 @@
+// Fits that have gone astray: something that the model lacks has sent them to a lens that is none.
+#ifndef CAMGYRO_ESTIMATOR_ASTRAY_H_
+#define CAMGYRO_ESTIMATOR_ASTRAY_H_
+
+#include <optional>
+#include <string>
+
+#include "core/calibration.h"
+#include "estimator/start/find_start.h"
+
+namespace camgyro {
+
+// A focal length has run away from where it was: they differ by more than a factor of 2.
+bool RanAway(double focal_px, double from_px);
+
+// A focal length is far from that of the rotations at the start, if they determine one: a strong
+// lens that nothing declares moves theirs by 7 % (rms, docs/lab/start.md), and a fit's by any
+// factor.
+bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start);
+
+// Beyond the range of real devices by more than so many of its sigmas, a value is not believed.
+constexpr double kImplausibleSigmas = 2.0;
+
+// What speaks against a fit with this effect of it: parameters outside of what real devices show,
+// or a focal length that ran away from start_focal_px. Empty: nothing.
+std::string Implausible(const EffectSet::Item& item, const Calibration& fit, double start_focal_px);
+
+// A fit bears out an effect of its own: one of its values is beyond 3 of its sigmas.
+bool IsSeen(const EffectSet::Item& item, const Calibration& fit);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_ASTRAY_H_

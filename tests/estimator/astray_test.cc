@@ -1,0 +1,125 @@
+// Fits that go astray for what the model lacks, and come back with it.
+#include "estimator/astray.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+
+#include "core/effects/catalogue.h"
+#include "estimator/calibrate.h"
+#include "frontend/camera_rotations.h"
+#include "tests/estimator/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Astray, AFocalLengthRunsAwayByAFactorOfTwo) {
+  EXPECT_FALSE(RanAway(500.0, 500.0));
+  EXPECT_FALSE(RanAway(990.0, 500.0));
+  EXPECT_FALSE(RanAway(260.0, 500.0));
+  EXPECT_TRUE(RanAway(1010.0, 500.0));
+  EXPECT_TRUE(RanAway(240.0, 500.0));
+  EXPECT_TRUE(RanAway(-500.0, 500.0));
+  EXPECT_TRUE(RanAway(std::numeric_limits<double>::quiet_NaN(), 500.0));
+}
+
+TEST(Astray, AFocalLengthIsFarFromThatOfTheRotations) {
+  std::optional<StartFocal> start;
+  EXPECT_FALSE(IsFarFromRotations(3000.0, start));
+  start = StartFocal{500.0, 5.0, /*determined=*/true, 0.5, {}};
+  EXPECT_FALSE(IsFarFromRotations(590.0, start));  // 18 % are what a lens may do to the rotations
+  EXPECT_TRUE(IsFarFromRotations(640.0, start));
+  start->sigma_px = 50.0;
+  EXPECT_FALSE(IsFarFromRotations(640.0, start));  // 2.8 of their sigmas
+  start->determined = false;
+  EXPECT_FALSE(IsFarFromRotations(3000.0, start));
+}
+
+TEST(Astray, WhatSpeaksAgainstAnEffect) {
+  const simulation::Simulated s = simulation::SimulateTracks(ShortScenario(1.0)).value();
+  Calibration fit = s.truth;
+  fit.effects = std::make_shared<const EffectSet>(
+      MakeEffects("radial_distortion:radtan", MakeEffectSetup(s.recording, s.truth)).value());
+  const EffectSet::Item& item = fit.effects->items().back();
+  fit.effect_covariance = 1e-6 * Eigen::MatrixXd::Identity(2, 2);
+  fit.effect_values = Eigen::Vector2d(-0.2, 0.05);
+  const double focal_px = fit.lens[kFocal];
+  EXPECT_EQ(Implausible(item, fit, focal_px), "");
+  EXPECT_THAT(Implausible(item, fit, 3.0 * focal_px), HasSubstr("runs away"));
+  EXPECT_TRUE(IsSeen(item, fit));
+  fit.effect_values[0] = -50.0;
+  EXPECT_THAT(Implausible(item, fit, focal_px), HasSubstr("k1"));
+  fit.effect_values = Eigen::Vector2d(-0.002, 0.0029);  // of sigmas of 0.001
+  EXPECT_FALSE(IsSeen(item, fit));
+}
+
+// 10 s of a room with a camera of 752 x 480.
+simulation::Scenario Room() {
+  simulation::Scenario scenario = ShortScenario(10.0);
+  scenario.camera.width_px = 752;
+  scenario.camera.focal_px = 458.0;
+  scenario.scene.kind = simulation::SceneKind::kRoom;
+  scenario.motion.speed_m_s = 0.8;
+  scenario.motion.path_radius_m = 1.5;
+  scenario.motion.heading_deg = 60.0;
+  return scenario;
+}
+
+Result<CalibrationReport> Calibrate(const Recording& recording, const CalibrateOptions& options) {
+  const auto rotations = [pairs = PairsForRotations(recording, 200)](
+                             const Recording& now, const std::vector<RotationTrial>& trials) {
+    return CameraRotationsOf(now, pairs, trials);
+  };
+  return CalibrateRecording(recording, rotations, options);
+}
+
+// Without the lens's distortion, the focal length runs to six times of what it is.
+TEST(CalibrateAstray, TakesInALensThatNobodyHasDeclared) {
+  simulation::Scenario scenario = Room();
+  scenario.effects.radial_distortion.k1 = -0.28;
+  scenario.effects.radial_distortion.k2 = 0.07;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  CalibrateOptions options;
+  options.try_what_leads_astray = false;
+  const auto plain = Calibrate(s.recording, options);
+  ASSERT_TRUE(plain.has_value()) << plain.error().message;
+  EXPECT_GT(plain->calibration.lens[kFocal], 2.0 * s.truth.lens[kFocal]);
+
+  const auto report = Calibrate(s.recording, {});
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_THAT(report->notes, Contains(HasSubstr("radial_distortion is fitted as well")));
+  const Calibration& c = report->calibration;
+  ASSERT_NE(c.effects, nullptr);
+  EXPECT_LT(ErrorInSigmas(c, s.truth).cwiseAbs().maxCoeff(), 4.5);
+  EXPECT_LT(c.sigma()[kStateFocal], 0.02 * s.truth.lens[kFocal]);
+  EXPECT_NEAR(c.effect_values[0], -0.28, 4.0 * std::sqrt(c.effect_covariance(0, 0)));
+  EXPECT_LT(report->quality.noise_px, 0.8 * plain->quality.noise_px);
+}
+
+// Where the lens bends nothing, no start makes it bend: one that is wrong by a factor of 3 sends
+// the online estimate as far from it.
+TEST(CalibrateAstray, TakesInNothingThatTheDataDoNotBearOut) {
+  const simulation::Simulated s = simulation::SimulateTracks(Room()).value();
+  const auto right = Calibrate(s.recording, {});
+  ASSERT_TRUE(right.has_value()) << right.error().message;
+  CalibrateOptions options;
+  options.given_start = right->start;
+  options.given_start->focal =
+      StartFocal{3.0 * s.truth.lens[kFocal], 10.0, /*determined=*/true, 0.5, {}};
+  const auto report = Calibrate(s.recording, options);
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_EQ(report->calibration.effects, nullptr);
+  EXPECT_THAT(report->notes, Not(Contains(HasSubstr("fitted as well"))));
+  EXPECT_THAT(report->doubts, Contains(HasSubstr("far from the")));
+  EXPECT_FALSE(report->calibration.determined[kStateFocal]);
+}
+
+}  // namespace
+}  // namespace camgyro
