@@ -16,6 +16,7 @@
 #include "estimator/moving_tracks.h"
 #include "estimator/online_pass.h"
 #include "estimator/times_between.h"
+#include "estimator/window/settle_effects.h"
 
 namespace camgyro {
 namespace {
@@ -324,8 +325,7 @@ class CalibrationJob {
     report_.calibration = refined->calibration;
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;
-    report_.frame_times =
-        TimesOfAllFrames(recording_, *refined, refinement, {options_.most_refined_pairs, left});
+    report_.frame_times = TimesOfAllFrames(recording_, *refined, refinement);
     if (refined->frame_wander.slow_s > 0.0) {
       report_.notes.push_back(Describe(refined->frame_wander));
     }

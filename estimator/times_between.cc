@@ -1,37 +1,91 @@
 #include "estimator/times_between.h"
 
+#include <algorithm>
+#include <cmath>
+#include <map>
 #include <memory>
 #include <utility>
 
+#include "core/parallel.h"
 #include "estimator/window/estimation_input.h"
 #include "estimator/window/pair_graph.h"
 
 namespace camgyro {
+namespace {
+
+// Pairs of neighbours that are fitted together. Frames' times hang together within a few frames:
+// where the calibration is held, stretches need not know of each other, and each settles in fewer
+// steps than all of a recording does.
+constexpr size_t kStretch = 150;
+// Pairs on either side that a stretch shares with the next one, so that none of its own frames is
+// at an end.
+constexpr size_t kShared = 10;
+
+// Rates that pairs within some time may need, those of frames that are late by kMostSpreadS
+// included [s].
+constexpr double kRateMarginS = 1.0;
+
+// Those of the pairs first, first + 1, ... before end, and their rates.
+EstimationInput PartOf(const EstimationInput& input, size_t first, size_t end,
+                       const Calibration& calibration) {
+  EstimationInput part;
+  part.origin_ns = input.origin_ns;
+  part.pairs.assign(input.pairs.begin() + static_cast<std::ptrdiff_t>(first),
+                    input.pairs.begin() + static_cast<std::ptrdiff_t>(end));
+  const auto delay_s = [&](const TimedPair& pair) { return DelayOf(calibration, pair.first()); };
+  const double from_s = part.pairs.front().time_a_s + delay_s(part.pairs.front()) - kRateMarginS;
+  const double to_s = part.pairs.back().time_b_s + delay_s(part.pairs.back()) + kRateMarginS;
+  for (const TimedRate& rate : input.rates) {
+    if (rate.time_s >= from_s && rate.time_s <= to_s) part.rates.push_back(rate);
+  }
+  return part;
+}
+
+}  // namespace
 
 std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Refined& fit,
-                                          const RefinementOptions& options,
-                                          const PairLimits& limits) {
+                                          const RefinementOptions& options) {
   // Of the calibration's sigmas: what is a frame's own moves nothing else.
   constexpr double kHeld = 1e-3;
   // The calibration and the times of the frames in pairs are known; what is left are directions and
-  // times, for which two rounds of search and solve do.
-  constexpr int kRounds = 2;
+  // times.
+  constexpr int kRounds = 3;
   const PairSelection selection = SelectPairs(recording);
   if (fit.frame_times.empty() || !selection.leaves_frames_out()) return fit.frame_times;
 
   const EstimationInput input = OutlineOf(recording, PairSelection());
-  std::vector<TimedPair> pairs =
-      InformativePairs(input, fit.calibration.delay_s, limits, options.graph);
-  AddMatches(recording, &pairs);
   auto times = std::make_shared<PairLatents>();
   times->frame_times_s = fit.latents->frame_times_s;
   RefinementOptions with = options;
   with.max_rounds = kRounds;
+  with.frame_times_alone = true;
   with.latents = std::move(times);
   with.graph.sigma = fit.quality.noise_px;
   const Prior held = {fit.calibration, kHeld * fit.calibration.sigma()};
-  const Result<Refined> all = Refine(input, pairs, fit.calibration, held, with);
-  return all ? all->frame_times : fit.frame_times;
+
+  std::map<int64_t, FrameOffset> all;  // by frame
+  for (const FrameOffset& frame : fit.frame_times) all[frame.frame] = frame;
+  std::vector<std::vector<FrameOffset>> of_stretches((input.pairs.size() + kStretch - 1) /
+                                                     kStretch);
+  ParallelFor(of_stretches.size(), [&](size_t k) {
+    const size_t first = k * kStretch, end = std::min(first + kStretch, input.pairs.size());
+    EstimationInput part = PartOf(input, first - std::min(first, kShared),
+                                  std::min(end + kShared, input.pairs.size()), fit.calibration);
+    AddMatches(recording, &part.pairs);
+    const Result<Refined> refined = Refine(part, part.pairs, fit.calibration, held, with);
+    if (!refined) return;
+    const int64_t own_from = PairGraph::FrameNumber(input.pairs[first].time_a_s);
+    const int64_t own_to = PairGraph::FrameNumber(input.pairs[end - 1].time_b_s);
+    for (const FrameOffset& frame : refined->frame_times) {
+      if (frame.frame >= own_from && frame.frame <= own_to) of_stretches[k].push_back(frame);
+    }
+  });
+  for (const auto& of_stretch : of_stretches) {
+    for (const FrameOffset& frame : of_stretch) all[frame.frame] = frame;
+  }
+  std::vector<FrameOffset> result;
+  for (const auto& entry : all) result.push_back(entry.second);
+  return result;
 }
 
 }  // namespace camgyro

@@ -7,6 +7,7 @@
 
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
+#include "estimator/window/settle_effects.h"
 
 namespace camgyro {
 

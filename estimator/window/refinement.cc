@@ -1,6 +1,5 @@
 #include "estimator/window/refinement.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include "core/parallel.h"
 #include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
+#include "estimator/window/yardstick.h"
 #include "factors/robust.h"
 
 namespace camgyro {
@@ -32,24 +32,6 @@ double LargestShift(const std::vector<TimedPair>& pairs, const Calibration& a,
     largest = std::max(largest, std::abs(shift));
   }
   return largest;
-}
-
-// Makes those effects anew that depend on the calibration; false if there are none.
-bool RemakeEffects(const Recording& recording, Calibration* calibration) {
-  if (calibration->effects == nullptr) return false;
-  auto set = std::make_shared<EffectSet>();
-  bool remade = false;
-  const EffectSetup setup = MakeEffectSetup(recording, *calibration);
-  for (const auto& item : calibration->effects->items()) {
-    std::shared_ptr<const Effect> effect = item.effect;
-    if (effect->depends_on_calibration()) {
-      effect = item.entry->make(setup, item.shape);
-      remade = true;
-    }
-    set->Add(item.entry, item.shape, effect);
-  }
-  calibration->effects = set;
-  return remade;
 }
 
 // How well matches fit.
@@ -122,32 +104,7 @@ constexpr double kCostTolerance = 0.005;
 // step that lowers the cost by less than this fraction changes it by half of that.
 constexpr double kRoughly = 1e-4;
 
-// Steps of the state are measured in sigmas, all of it together. A step below this is the last one:
-// steps shrink by a factor of 1.5 to 5 each, so what is left is as much or twice as much, and that
-// of a state of 11 and more numbers.
-constexpr double kSettledStep = 0.1;
 constexpr int kLeastPairs = 10;
-
-// How far two states are apart, with their effects, in sigmas: the Mahalanobis distance.
-class Yardstick {
- public:
-  // covariance: of the state and the effects.
-  explicit Yardstick(const Eigen::MatrixXd& covariance)
-      : scale_(covariance.diagonal().cwiseSqrt().cwiseInverse()),
-        // Unit diagonal before the factorisation: the units differ by orders of magnitude.
-        correlation_(scale_.asDiagonal() * covariance * scale_.asDiagonal()) {}
-  double Distance(const Calibration& a, const Calibration& b) const {
-    Eigen::VectorXd d(scale_.size());
-    d.head<kStateSize>() = Difference(a, b);
-    d.tail(d.size() - kStateSize) = a.effect_values - b.effect_values;
-    d = scale_.cwiseProduct(d);
-    return std::sqrt(std::abs(d.dot(correlation_.solve(d))));
-  }
-
- private:
-  Eigen::VectorXd scale_;
-  Eigen::LDLT<Eigen::MatrixXd> correlation_;
-};
 
 // Noise scale, directions and solve in turns.
 class Refinement {
@@ -307,7 +264,13 @@ class Refinement {
       if (const auto covariance = graph_->NoiseCovariance()) yardstick_.emplace(*covariance);
     }
     Calibration last = graph_->Estimate();
-    if (yardstick_) {
+    if (options_.frame_times_alone && !result_.frame_times.empty()) {  // from the second round on
+      options.settled = [this, last_s = graph_->Latents().frame_times_s]() mutable {
+        auto now_s = graph_->Latents().frame_times_s;
+        std::swap(last_s, now_s);
+        return FrameTimesHaveSettled(result_.frame_times, now_s, last_s);
+      };
+    } else if (yardstick_) {
       options.settled = [&] {
         const Calibration now = graph_->Estimate();
         const double step = yardstick_->Distance(last, now);
@@ -386,22 +349,6 @@ void TakeNoiseFactors(const std::map<int64_t, double>& factors, std::vector<Time
     const auto known = factors.find(pair.id);
     if (known != factors.end()) pair.noise_factor = known->second;
   }
-}
-
-Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
-  constexpr int kMostTimes = 5;
-  for (int i = 0; i < kMostTimes && RemakeEffects(recording, &fit.calibration); ++i) {
-    Result<Refined> better = refit(fit);
-    if (!better) break;
-    const Calibration& c = better->calibration;
-    const StateVector moved = Difference(c, fit.calibration).cwiseQuotient(c.sigma());
-    const Eigen::VectorXd effects_moved =
-        (c.effect_values - fit.calibration.effect_values)
-            .cwiseQuotient(c.effect_covariance.diagonal().cwiseSqrt());
-    fit = *std::move(better);
-    if (std::max(moved.cwiseAbs().maxCoeff(), effects_moved.cwiseAbs().maxCoeff()) < 0.1) break;
-  }
-  return fit;
 }
 
 UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,

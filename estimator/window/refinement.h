@@ -3,7 +3,6 @@
 #define CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -34,6 +33,9 @@ struct RefinementOptions {
   // error of all sigmas.
   double settled_scale = 0.03;
   double cluster_s = 2.0;  // stretches of the clustered covariance
+  // The calibration is held, and the frames' own times are what is asked for: it is they that have
+  // to settle in a round.
+  bool frame_times_alone = false;
   // The pairs' factors are found; false: they stay as they are.
   bool find_noise_factors = true;
   // Of a fit that has settled, whose result and noise this one starts from; null: of none.
@@ -71,12 +73,6 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
 
 // Gives pairs the noise that a fit has found for them; those that it has not keep theirs.
 void TakeNoiseFactors(const std::map<int64_t, double>& factors, std::vector<TimedPair>* pairs);
-
-// A fit with those effects made anew that depend on the calibration, and refitted, until it stays
-// within a tenth of a sigma: what is left to gain by that would be taken for another effect's.
-// `refit`: from where a fit ended, but for its effects; where it fails, the last fit stands.
-using Refit = std::function<Result<Refined>(const Refined& from)>;
-Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit);
 
 // Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
 // direction of each pair (and its frames' own times, if they have any) from every other match,

@@ -3,10 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <set>
+#include <tuple>
+#include <vector>
 
 #include "core/effects/catalogue.h"
 #include "estimator/window/pair_graph.h"
@@ -15,51 +19,83 @@
 namespace camgyro {
 namespace {
 
-TEST(TimesOfAllFrames, AreThoseOfFramesThatNoPairHas) {
-  constexpr double kSpreadS = 2e-3;
+// A recording whose frames have times of their own, and a fit of every third frame.
+struct Fitted {
+  simulation::Simulated s;
+  RefinementOptions options;
+  Refined fit;
+  std::set<int64_t> known;  // frames of the fit
+};
+
+constexpr double kSpreadS = 2e-3;
+
+Fitted Fit(simulation::MotionKind motion, double noise_px) {
   simulation::Scenario scenario = ShortScenario(12.0);
+  scenario.motion = simulation::MotionPreset(motion);
   scenario.tracks.reanchored = true;
-  scenario.tracks.noise_px = 0.1;
+  scenario.tracks.noise_px = noise_px;
   scenario.effects.frame_stamp_jitter.spread_s = kSpreadS;
-  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
-  const PairSelection selection = SelectPairs(s.recording);
-  ASSERT_TRUE(selection.leaves_frames_out());
-  const EstimationInput input = MakeEstimationInput(s.recording, selection);
-  const Prior prior = StartOffTheTruth(s.truth);
+  Fitted f;
+  f.s = simulation::SimulateTracks(scenario).value();
+  const PairSelection selection = SelectPairs(f.s.recording);
+  EXPECT_TRUE(selection.leaves_frames_out());
+  const EstimationInput input = MakeEstimationInput(f.s.recording, selection);
+  const Prior prior = StartOffTheTruth(f.s.truth);
   Calibration start = prior.mean;
   start.effects = std::make_shared<const EffectSet>(
-      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(f.s.recording, start)).value());
   start.effect_values = Eigen::VectorXd::Zero(1);
-  RefinementOptions options;
-  options.graph.match_noise = MatchNoise::kSecondImage;
-  const Result<Refined> fit = Refine(input, input.pairs, start, prior, options);
-  ASSERT_TRUE(fit.has_value()) << fit.error().message;
-  std::set<int64_t> known;
-  for (const FrameOffset& frame : fit->frame_times) known.insert(frame.frame);
-  ASSERT_LT(known.size(), s.frames.size() / 2 + 1);
+  f.options.graph.match_noise = MatchNoise::kSecondImage;
+  f.fit = Refine(input, input.pairs, start, prior, f.options).value();
+  for (const FrameOffset& frame : f.fit.frame_times) f.known.insert(frame.frame);
+  EXPECT_LT(f.known.size(), f.s.frames.size() / 2 + 1);
+  return f;
+}
 
-  std::map<int64_t, double> truth_s;
-  for (size_t i = 0; i < s.frames.size(); ++i) {
-    truth_s[s.recording.frames[i].stamp_ns - input.origin_ns] = s.frames[i].delay_s;
+// 12 s are three stretches.
+TEST(TimesOfAllFrames, AreThoseOfFramesThatNoPairHas) {
+  using simulation::MotionKind;
+  double all_sq = 0.0;
+  int all = 0;
+  for (const auto& [motion, noise_px, told_share] :
+       {std::tuple(MotionKind::kHandheld, 0.1, 0.5), std::tuple(MotionKind::kHandheld, 0.3, 0.0),
+        std::tuple(MotionKind::kWalking, 0.1, 0.0)}) {
+    const Fitted f = Fit(motion, noise_px);
+    const int64_t origin_ns = f.s.recording.gyro.front().stamp_ns;
+    std::map<int64_t, double> truth_s;
+    for (size_t i = 0; i < f.s.frames.size(); ++i) {
+      truth_s[f.s.recording.frames[i].stamp_ns - origin_ns] = f.s.frames[i].delay_s;
+    }
+    const std::vector<FrameOffset> times = TimesOfAllFrames(f.s.recording, f.fit, f.options);
+    EXPECT_TRUE(std::is_sorted(times.begin(), times.end(),
+                               [](const auto& a, const auto& b) { return a.frame < b.frame; }));
+    double errors_sq = 0.0, sum_sq = 0.0;
+    int between = 0, told = 0;
+    for (const FrameOffset& frame : times) {
+      if (f.known.count(frame.frame) > 0) continue;
+      ++between;
+      told += frame.sigma_s < 0.25 * kSpreadS ? 1 : 0;
+      // An error of the delay, which all frames share, is taken back by their offsets.
+      const double error_s = f.fit.calibration.delay_s + frame.offset_s - truth_s.at(frame.frame);
+      errors_sq += std::pow(error_s, 2);
+      sum_sq += std::pow(error_s / frame.sigma_s, 2);
+    }
+    std::printf("%.1f px: %d frames, rms error %.3f ms, %.2f sigma^2\n", noise_px, between,
+                1e3 * std::sqrt(errors_sq / between), sum_sq / between);
+    EXPECT_GE(f.known.size() + static_cast<size_t>(between), f.s.frames.size() - 4);
+    EXPECT_GT(told, told_share * between);
+    EXPECT_LT(std::sqrt(errors_sq / between), 0.35 * kSpreadS);
+    all_sq += sum_sq;
+    all += between;
   }
-  const Calibration& c = fit->calibration;
-  double sum_sq = 0.0;
-  int between = 0, told = 0;
-  for (const FrameOffset& frame : TimesOfAllFrames(s.recording, *fit, options, PairLimits())) {
-    if (known.count(frame.frame) > 0) continue;
-    ++between;
-    told += frame.sigma_s < 0.25 * kSpreadS ? 1 : 0;
-    // An error of the delay, which all frames share, is taken back by their offsets.
-    sum_sq += std::pow((c.delay_s + frame.offset_s - truth_s.at(frame.frame)) / frame.sigma_s, 2);
-  }
-  EXPECT_GE(known.size() + static_cast<size_t>(between), s.frames.size() - 4);
-  EXPECT_GT(told, between / 2);
-  EXPECT_NEAR(sum_sq / between, 1.0, 0.35);
+  EXPECT_NEAR(all_sq / all, 1.0, 0.35);
+}
 
-  // Every frame is in a pair of neighbours already: nothing is done.
-  Recording both = s.recording;
-  both.match_noise = MatchNoise::kBothImages;
-  EXPECT_EQ(TimesOfAllFrames(both, *fit, options, PairLimits()).size(), fit->frame_times.size());
+// Every frame is in a pair of neighbours already: nothing is done.
+TEST(TimesOfAllFrames, AreThoseOfTheFitWhereItLeavesNoFrameOut) {
+  Fitted f = Fit(simulation::MotionKind::kHandheld, 0.1);
+  f.s.recording.match_noise = MatchNoise::kBothImages;
+  EXPECT_EQ(TimesOfAllFrames(f.s.recording, f.fit, f.options).size(), f.fit.frame_times.size());
 }
 
 }  // namespace

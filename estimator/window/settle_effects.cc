@@ -1,0 +1,48 @@
+#include "estimator/window/settle_effects.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "estimator/window/estimation_input.h"
+
+namespace camgyro {
+namespace {
+
+// Makes those effects anew that depend on the calibration; false if there are none.
+bool RemakeEffects(const Recording& recording, Calibration* calibration) {
+  if (calibration->effects == nullptr) return false;
+  auto set = std::make_shared<EffectSet>();
+  bool remade = false;
+  const EffectSetup setup = MakeEffectSetup(recording, *calibration);
+  for (const auto& item : calibration->effects->items()) {
+    std::shared_ptr<const Effect> effect = item.effect;
+    if (effect->depends_on_calibration()) {
+      effect = item.entry->make(setup, item.shape);
+      remade = true;
+    }
+    set->Add(item.entry, item.shape, effect);
+  }
+  calibration->effects = set;
+  return remade;
+}
+
+}  // namespace
+
+Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
+  constexpr int kMostTimes = 5;
+  for (int i = 0; i < kMostTimes && RemakeEffects(recording, &fit.calibration); ++i) {
+    Result<Refined> better = refit(fit);
+    if (!better) break;
+    const Calibration& c = better->calibration;
+    const StateVector moved = Difference(c, fit.calibration).cwiseQuotient(c.sigma());
+    const Eigen::VectorXd effects_moved =
+        (c.effect_values - fit.calibration.effect_values)
+            .cwiseQuotient(c.effect_covariance.diagonal().cwiseSqrt());
+    fit = *std::move(better);
+    if (std::max(moved.cwiseAbs().maxCoeff(), effects_moved.cwiseAbs().maxCoeff()) < 0.1) break;
+  }
+  return fit;
+}
+
+}  // namespace camgyro
