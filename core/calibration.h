@@ -55,6 +55,8 @@ struct Calibration {
 struct Prior {
   Calibration mean;
   StateVector sigma = StateVector::Zero();  // [px, s, rad/s, rad]
+  // Of the mean's effects, in their units. Empty: each has the prior of its own, around zero.
+  Eigen::VectorXd effect_sigma = {};
 };
 
 // a [-] b: difference of two calibrations in the tangent, in the order of StateIndex.

@@ -61,7 +61,9 @@ std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Refi
   with.frame_times_alone = true;
   with.latents = std::move(times);
   with.graph.sigma = fit.quality.noise_px;
-  const Prior held = {fit.calibration, kHeld * fit.calibration.sigma()};
+  const Calibration& c = fit.calibration;
+  const Prior held = {c, kHeld * c.sigma(),
+                      kHeld * c.effect_covariance.diagonal().cwiseMax(1e-24).cwiseSqrt()};
 
   std::map<int64_t, FrameOffset> all;  // by frame
   for (const FrameOffset& frame : fit.frame_times) all[frame.frame] = frame;

@@ -38,6 +38,7 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
     : options_(options),
       start_(std::move(latents)),
       prior_mean_(prior.mean),
+      effect_prior_sigma_(prior.effect_sigma),
       effects_(WithParameters(start)),
       rates_(options, prior, start.bias_gyro_rad_s, effects_),
       turn_sigma_rad_s_(options.turn_sigma_rad_s) {
@@ -54,6 +55,8 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
   }
   if (effects_ == nullptr) return;
   CHECK_EQ(start.effect_values.size(), effects_->size());
+  CHECK(effect_prior_sigma_.size() == 0 ||
+        (effect_prior_sigma_.size() == effects_->size() && prior.mean.effects == start.effects));
   graph_.AddBlock(kEffectsBlock, {Geometry::kEuclidean, start.effect_values, {}});
   if (const int column = effects_->frame_time_spread();
       column >= 0 && residual().facts().with_frame_times) {
@@ -85,6 +88,10 @@ void PairGraph::AddStatePrior(const Prior& prior) {
 void PairGraph::AddEffectsPrior() {
   Eigen::VectorXd spread(effects_->size()), mean = Eigen::VectorXd::Zero(effects_->size());
   for (int i = 0; i < effects_->size(); ++i) spread[i] = effects_->parameter(i).spread;
+  if (effect_prior_sigma_.size() > 0) {
+    mean = prior_mean_.effect_values;
+    spread = effect_prior_sigma_;
+  }
   // What no residual depends on stays where it is.
   if (has_frame_times()) mean[effects_->frame_time_spread()] = *frame_time_spread_s_;
   effects_prior_ = graph_.AddFactor(

@@ -223,6 +223,7 @@ class PairGraph {
   PairGraphOptions options_;
   std::shared_ptr<const PairLatents> start_;
   Calibration prior_mean_;                    // with the effects of the start
+  const Eigen::VectorXd effect_prior_sigma_;  // Prior::effect_sigma
   std::shared_ptr<const EffectSet> effects_;  // null without effects that have parameters
   FactorGraph graph_;
   RateGroups rates_;
