@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <utility>
 
@@ -33,6 +34,7 @@ class WanderSystem {
     }
     for (auto& entry : at) {
       entry.second = static_cast<Eigen::Index>(times_s_.size());
+      numbers_.push_back(entry.first);
       times_s_.push_back(1e-9 * static_cast<double>(entry.first));
     }
     score_.setZero(frames());
@@ -64,6 +66,22 @@ class WanderSystem {
     for (const auto& entry : information_) sums[entry.row()] += entry.value();
     const Eigen::VectorXd b = Both(wander, sums);
     return sums.sum() - b.dot(solver_.solve(b));
+  }
+
+  std::vector<FrameOffset> Offsets(const FrameWander& wander) {
+    Factorise(wander);
+    const Eigen::Index n = frames();
+    const Eigen::VectorXd parts = -solver_.solve(Both(wander, score_));
+    std::vector<FrameOffset> offsets;
+    Eigen::VectorXd of_frame = Eigen::VectorXd::Zero(2 * n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      of_frame[i] = wander.white_s;
+      of_frame[n + i] = wander.slow_s;
+      offsets.push_back({numbers_[static_cast<size_t>(i)], of_frame.dot(parts),
+                         std::sqrt(of_frame.dot(solver_.solve(of_frame)))});
+      of_frame[i] = of_frame[n + i] = 0.0;
+    }
+    return offsets;
   }
 
  private:
@@ -105,6 +123,7 @@ class WanderSystem {
     solver_.factorize(A);
   }
 
+  std::vector<int64_t> numbers_;  // of frames
   std::vector<double> times_s_;
   Eigen::VectorXd score_;
   std::vector<Eigen::Triplet<double>> information_;
@@ -158,6 +177,10 @@ FrameWander MostLikelyWander(const std::vector<PairTimes>& pairs, double white_s
     if (found.two_log_likelihood > best.two_log_likelihood) best = found;
   }
   return best.two_log_likelihood > kSignificant ? best : white;
+}
+
+std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const FrameWander& wander) {
+  return WanderSystem(pairs).Offsets(wander);
 }
 
 double VarianceOfShift(const std::vector<PairTimes>& pairs, const FrameWander& wander) {

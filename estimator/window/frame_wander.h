@@ -29,6 +29,10 @@ double TwoLogLikelihood(const std::vector<PairTimes>& pairs, const FrameWander& 
 // white_s: MostLikelySpread.
 FrameWander MostLikelyWander(const std::vector<PairTimes>& pairs, double white_s);
 
+// Mean and standard deviation of each frame's offset given the wander, in the order of frames:
+// where the matches say little of a frame, it is near its neighbours, not near zero.
+std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const FrameWander& wander);
+
 // Variance of a shift that all frames share, if nothing but their offsets hides it [s^2].
 double VarianceOfShift(const std::vector<PairTimes>& pairs, const FrameWander& wander);
 

@@ -292,8 +292,8 @@ class Refinement {
     const CrossFit cross_fit = graph_->CrossFitOfAll();
     if (graph_->has_frame_times()) {
       const std::vector<PairTimes> times = WidenedTimes(*graph_, cross_fit.inflation());
-      result_.frame_times = OffsetsOf(times, graph_->frame_time_spread_s());
       result_.frame_wander = FindWander(times, graph_.get());
+      result_.frame_times = OffsetsOf(times, result_.frame_wander);
     }
     if (const Status known = graph_->EstimateCovariance(options_.cluster_s, cross_fit.inflation(),
                                                         &result_.calibration);
