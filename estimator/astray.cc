@@ -53,4 +53,31 @@ bool IsSeen(const EffectSet::Item& item, const Calibration& fit) {
       .any();
 }
 
+std::vector<std::pair<const EffectEntry*, std::string>> WhatLeadsAstray(const EffectSetup& setup) {
+  std::vector<std::pair<const EffectEntry*, std::string>> all;
+  for (const EffectEntry& entry : EffectCatalogue()) {
+    if (!entry.leads_astray) continue;
+    for (const std::string& shape : entry.shapes(setup)) all.emplace_back(&entry, shape);
+  }
+  return all;
+}
+
+bool IsBornOut(const CalibrationReport& fit, const std::string& effect, double begin_focal_px,
+               double noise_px) {
+  const Calibration& c = fit.calibration;
+  if (c.effects == nullptr || !(fit.quality.noise_px < noise_px) ||
+      IsFarFromRotations(c.lens[kFocal], fit.start.focal)) {
+    return false;
+  }
+  const auto& items = c.effects->items();
+  return std::any_of(items.begin(), items.end(), [&](const EffectSet::Item& item) {
+    return item.entry->name == effect && Implausible(item, c, begin_focal_px).empty() &&
+           IsSeen(item, c);
+  });
+}
+
+double UnseenRms(const CalibrationReport& fit) {
+  return fit.unseen ? fit.unseen->rms_px : fit.quality.rms_px;
+}
+
 }  // namespace camgyro

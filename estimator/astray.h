@@ -4,8 +4,12 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/calibration.h"
+#include "core/effects/catalogue.h"
+#include "estimator/calibrate.h"
 #include "estimator/start/find_start.h"
 
 namespace camgyro {
@@ -27,6 +31,18 @@ std::string Implausible(const EffectSet::Item& item, const Calibration& fit, dou
 
 // A fit bears out an effect of its own: one of its values is beyond 3 of its sigmas.
 bool IsSeen(const EffectSet::Item& item, const Calibration& fit);
+
+// The effects that lead fits astray (EffectEntry::leads_astray), in each of their shapes.
+std::vector<std::pair<const EffectEntry*, std::string>> WhatLeadsAstray(const EffectSetup& setup);
+
+// Whether the data bear out an effect that a fit has in place of a fit that went astray: the focal
+// length is near that of the start and of where it began [px], the noise is less than `noise_px` of
+// the other fit, and the effect's values are like those of real devices, and not zero.
+bool IsBornOut(const CalibrationReport& fit, const std::string& effect, double begin_focal_px,
+               double noise_px);
+
+// Of the frames that each half of a fit has not seen, where it was tested; else of all [px].
+double UnseenRms(const CalibrationReport& fit);
 
 }  // namespace camgyro
 

@@ -185,43 +185,38 @@ class CalibrationJob {
                              RanAway(estimate_.lens[kFocal], from_start_.lens[kFocal]));
   }
 
-  // The calibration with the first effect that leads fits astray and that the data bear out: its
-  // focal length is near the start's, it has less noise than the online estimate without the
-  // effect, and values of it that are like those of real devices, and not zero.
+  // The calibration with an effect that leads fits astray and that the data bear out: of its
+  // shapes, and of several such effects, with the one that fits unseen frames best.
   std::optional<CalibrationReport> CalibrateWithWhatLeadsAstray(
       const CameraRotationsAt& rotations_at) const {
     const double begin_px = from_start_.lens[kFocal];
-    for (const EffectEntry& entry : EffectCatalogue()) {
-      if (!entry.leads_astray || !report_.residual->facts().with_effects ||
-          (from_start_.effects != nullptr && from_start_.effects->Has(entry.name))) {
+    std::optional<CalibrationReport> best;
+    const EffectEntry* added = nullptr;
+    for (const auto& [entry, shape] : WhatLeadsAstray(MakeEffectSetup(recording_, from_start_))) {
+      if (!report_.residual->facts().with_effects ||
+          (from_start_.effects != nullptr && from_start_.effects->Has(entry->name))) {
         continue;
       }
       CalibrateOptions with = options_;
-      with.effects += (with.effects.empty() ? "" : ",") + entry.name;
+      with.effects += (with.effects.empty() ? "" : ",") + entry->name + ":" + shape;
       with.given_start = report_.start;
       with.try_what_leads_astray = false;
       Result<CalibrationReport> fit = CalibrationJob(recording_, with, progress_).Run(rotations_at);
-      if (!fit) continue;
-      const Calibration& c = fit->calibration;
-      const auto& items = c.effects->items();
-      const auto item = std::find_if(items.begin(), items.end(),
-                                     [&](const auto& i) { return i.entry->name == entry.name; });
-      if (IsFarFromRotations(c.lens[kFocal], report_.start.focal) ||
-          !Implausible(*item, c, begin_px).empty() || !IsSeen(*item, c) ||
-          !(fit->quality.noise_px < *online_noise_)) {
-        continue;
-      }
-      fit->notes.push_back(Format(
-          "%s is fitted as well, although nobody asked for it: without it the focal length ran "
-          "from %.0f to %.0f px online, and the noise was %.2f instead of %.2f px; %s",
-          entry.name.c_str(), begin_px, estimate_.lens[kFocal], *online_noise_,
-          fit->quality.noise_px, entry.advice.c_str()));
-      for (size_t i = 0; i < report_.times.size(); ++i) {  // of the fit that went astray, too
-        fit->times[i].seconds += report_.times[i].seconds;
-      }
-      return *std::move(fit);
+      if (!fit || !IsBornOut(*fit, entry->name, begin_px, *online_noise_)) continue;
+      if (best && !(UnseenRms(*fit) < UnseenRms(*best))) continue;
+      best = *std::move(fit);
+      added = entry;
     }
-    return std::nullopt;
+    if (!best) return best;
+    best->notes.push_back(Format(
+        "%s is fitted as well, although nobody asked for it: without it the focal length ran from "
+        "%.0f to %.0f px online, and the noise was %.2f instead of %.2f px; %s",
+        added->name.c_str(), begin_px, estimate_.lens[kFocal], *online_noise_,
+        best->quality.noise_px, added->advice.c_str()));
+    for (size_t i = 0; i < report_.times.size(); ++i) {  // of the fit that went astray, too
+      best->times[i].seconds += report_.times[i].seconds;
+    }
+    return best;
   }
 
   // All of the online pass.

@@ -97,6 +97,7 @@ TEST(CalibrateAstray, TakesInALensThatNobodyHasDeclared) {
   EXPECT_THAT(report->notes, Contains(HasSubstr("radial_distortion is fitted as well")));
   const Calibration& c = report->calibration;
   ASSERT_NE(c.effects, nullptr);
+  EXPECT_EQ(c.effects->items().front().shape, "radtan");
   EXPECT_LT(ErrorInSigmas(c, s.truth).cwiseAbs().maxCoeff(), 4.5);
   EXPECT_LT(c.sigma()[kStateFocal], 0.02 * s.truth.lens[kFocal]);
   EXPECT_NEAR(c.effect_values[0], -0.28, 4.0 * std::sqrt(c.effect_covariance(0, 0)));
