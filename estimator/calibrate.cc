@@ -31,27 +31,6 @@ std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
   return rotations;
 }
 
-// The start with the field of view scanned; where the scan finds none that it can trust, at the
-// usual one that explains the gyro best, with the focal length left open. Errors: of the scan.
-Result<StartResult> StartFromPictures(const Recording& recording,
-                                      const CameraRotationsAt& rotations_at,
-                                      const CalibrateOptions& options) {
-  const Result<StartResult> scanned =
-      FindStartAndFocal(recording, rotations_at, options.start, options.focal_scan);
-  if (scanned || scanned.error().kind != ErrorKind::kCannotEstimate) return scanned;
-  Result<StartResult> best = scanned;
-  for (const double focal : {0.55, 0.65, 0.8, 1.0}) {  // of the picture's width
-    const RotationTrial trial{focal * recording.camera.width_px, std::nullopt};
-    const Result<StartResult> start =
-        FindStart(recording, rotations_at(recording, {trial}).front(), options.start);
-    if (start && (!best || start->explained > best->explained)) best = start;
-  }
-  if (best) {
-    best->notes.push_back("no focal length could be found for the start: a usual one is used");
-  }
-  return best;
-}
-
 }  // namespace
 
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
@@ -86,8 +65,11 @@ class CalibrationJob {
     if (const Status found = Start(rotations_at); !found) return tl::unexpected(found.error());
     if (!attitudes_ && options_.online) {
       if (const Status done = Window(); !done) return tl::unexpected(done.error());
-      if (options_.try_what_leads_astray && options_.refine && IsAstray()) {
-        if (auto better = CalibrateWithWhatLeadsAstray(rotations_at)) return *std::move(better);
+      // What a fit of all pairs makes of an online estimate that is astray would take minutes.
+      if (online_noise_ && MayBeAstray(estimate_)) {
+        if (auto better = TryWhatLeadsAstray(rotations_at, estimate_, *online_noise_)) {
+          return *std::move(better);
+        }
       }
     }
     if (!options_.refine) {
@@ -95,6 +77,12 @@ class CalibrationJob {
     }
     if (options_.refine || !report_.online) {
       if (const Status done = Refinement(); !done) return tl::unexpected(done.error());
+      const double noise = report_.quality.noise_px;
+      if (MayBeAstray(report_.calibration)) {
+        if (auto better = TryWhatLeadsAstray(rotations_at, report_.calibration, noise)) {
+          return *std::move(better);
+        }
+      }
     } else {
       report_.calibration = *report_.online;
       report_.quality.pairs = report_.pairs_used_online;
@@ -117,6 +105,12 @@ class CalibrationJob {
   }
 
  private:
+  static double SecondsOf(const std::vector<StageTime>& times) {
+    double sum = 0.0;
+    for (const StageTime& time : times) sum += time.seconds;
+    return sum;
+  }
+
   void Tell(const std::string& stage, double done) const {
     if (progress_) progress_(stage, done);
   }
@@ -125,8 +119,9 @@ class CalibrationJob {
     Tell("start", 0.0);
     const Result<StartResult> start =
         options_.given_start ? Result<StartResult>(*options_.given_start)
-        : attitudes_         ? FindStart(recording_, NeighbourRotations(recording_), options_.start)
-                             : StartFromPictures(recording_, rotations_at, options_);
+        : attitudes_
+            ? FindStart(recording_, NeighbourRotations(recording_), options_.start)
+            : FindStartFromPictures(recording_, rotations_at, options_.start, options_.focal_scan);
     if (!start) return tl::unexpected(start.error());
     report_.start = *start;
     for (const std::string& note : start->notes) report_.notes.push_back("at the start: " + note);
@@ -178,17 +173,20 @@ class CalibrationJob {
     return {};
   }
 
-  // The focal length of the online estimate has left that of the start. What a fit of all pairs
-  // makes of it would take minutes, and be wrong.
-  bool IsAstray() const {
-    return online_noise_ && (IsFarFromRotations(estimate_.lens[kFocal], report_.start.focal) ||
-                             RanAway(estimate_.lens[kFocal], from_start_.lens[kFocal]));
+  // The focal length has left that of the start, and nothing else was tried yet.
+  bool MayBeAstray(const Calibration& fit) const {
+    return options_.try_what_leads_astray && options_.online && options_.refine && !attitudes_ &&
+           !tried_what_leads_astray_ &&
+           (IsFarFromRotations(fit.lens[kFocal], report_.start.focal) ||
+            RanAway(fit.lens[kFocal], from_start_.lens[kFocal]));
   }
 
   // The calibration with an effect that leads fits astray and that the data bear out: of its
-  // shapes, and of several such effects, with the one that fits unseen frames best.
-  std::optional<CalibrationReport> CalibrateWithWhatLeadsAstray(
-      const CameraRotationsAt& rotations_at) const {
+  // shapes, and of several such effects, with the one that fits unseen frames best. astray: the fit
+  // without it, and its noise.
+  std::optional<CalibrationReport> TryWhatLeadsAstray(const CameraRotationsAt& rotations_at,
+                                                      const Calibration& astray, double noise_px) {
+    tried_what_leads_astray_ = true;
     const double begin_px = from_start_.lens[kFocal];
     std::optional<CalibrationReport> best;
     const EffectEntry* added = nullptr;
@@ -202,7 +200,7 @@ class CalibrationJob {
       with.given_start = report_.start;
       with.try_what_leads_astray = false;
       Result<CalibrationReport> fit = CalibrationJob(recording_, with, progress_).Run(rotations_at);
-      if (!fit || !IsBornOut(*fit, entry->name, begin_px, *online_noise_)) continue;
+      if (!fit || !IsBornOut(*fit, entry->name, begin_px, noise_px)) continue;
       if (best && !(UnseenRms(*fit) < UnseenRms(*best))) continue;
       best = *std::move(fit);
       added = entry;
@@ -210,12 +208,12 @@ class CalibrationJob {
     if (!best) return best;
     best->notes.push_back(Format(
         "%s is fitted as well, although nobody asked for it: without it the focal length ran from "
-        "%.0f to %.0f px online, and the noise was %.2f instead of %.2f px; %s",
-        added->name.c_str(), begin_px, estimate_.lens[kFocal], *online_noise_,
-        best->quality.noise_px, added->advice.c_str()));
-    for (size_t i = 0; i < report_.times.size(); ++i) {  // of the fit that went astray, too
-      best->times[i].seconds += report_.times[i].seconds;
-    }
+        "%.0f to %.0f px, and the noise was %.2f instead of %.2f px; %s",
+        added->name.c_str(), begin_px, astray.lens[kFocal], noise_px, best->quality.noise_px,
+        added->advice.c_str()));
+    clock_.Finish("other fits");
+    best->times.insert(best->times.begin(),
+                       {"other fits", SecondsOf(report_.times) - SecondsOf(best->times)});
     return best;
   }
 
@@ -375,6 +373,7 @@ class CalibrationJob {
   CalibrationReport report_;
   StageClock clock_;
   Calibration estimate_, from_start_;
+  bool tried_what_leads_astray_ = false;
   std::optional<OnlinePass> online_;
   std::optional<double> online_noise_;  // [px], where the refinement starts
   std::vector<TimedPair> refined_pairs_;

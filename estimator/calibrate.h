@@ -33,9 +33,9 @@ struct CalibrateOptions {
   std::optional<StartResult> given_start;
   std::optional<Calibration> from;
   bool online = true;  // false: no sliding window, the refinement alone
-  // Where the online estimate goes astray, another calibration is made with an effect of the
-  // catalogue that leads fits so far (EffectEntry::leads_astray: the lens's distortion), and taken
-  // if the data bear it out.
+  // Where the estimate goes astray, online or in the end, another calibration is made with an
+  // effect of the catalogue that leads fits so far (EffectEntry::leads_astray: the lens's
+  // distortion), and taken if the data bear it out.
   bool try_what_leads_astray = true;
   FocalScanOptions focal_scan;
   SlidingWindowOptions window;  // its graph is that of the refinement, too

@@ -395,4 +395,23 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   return start;
 }
 
+Result<StartResult> FindStartFromPictures(const Recording& recording,
+                                          const CameraRotationsAt& rotations_at,
+                                          const StartOptions& options,
+                                          const FocalScanOptions& scan) {
+  const Result<StartResult> scanned = FindStartAndFocal(recording, rotations_at, options, scan);
+  if (scanned || scanned.error().kind != ErrorKind::kCannotEstimate) return scanned;
+  Result<StartResult> best = scanned;
+  for (const double focal : {0.55, 0.65, 0.8, 1.0}) {  // of the picture's width
+    const RotationTrial trial{focal * recording.camera.width_px, std::nullopt};
+    const Result<StartResult> start =
+        FindStart(recording, rotations_at(recording, {trial}).front(), options);
+    if (start && (!best || start->explained > best->explained)) best = start;
+  }
+  if (best) {
+    best->notes.push_back("no focal length could be found for the start: a usual one is used");
+  }
+  return best;
+}
+
 }  // namespace camgyro

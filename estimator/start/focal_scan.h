@@ -45,6 +45,13 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
                                       const StartOptions& options,
                                       const FocalScanOptions& scan_options);
 
+// The same; where the scan finds none that it can trust, at the usual focal length that explains
+// the gyro best, which is then left open. Errors: of the scan.
+Result<StartResult> FindStartFromPictures(const Recording& recording,
+                                          const CameraRotationsAt& rotations_at,
+                                          const StartOptions& options,
+                                          const FocalScanOptions& scan = {});
+
 }  // namespace camgyro
 
 #endif  // CAMGYRO_ESTIMATOR_START_FOCAL_SCAN_H_

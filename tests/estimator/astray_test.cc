@@ -104,6 +104,24 @@ TEST(CalibrateAstray, TakesInALensThatNobodyHasDeclared) {
   EXPECT_LT(report->quality.noise_px, 0.8 * plain->quality.noise_px);
 }
 
+// In a pan the online estimate stays where it began; it is the fit of all pairs that runs away.
+TEST(CalibrateAstray, TakesInALensAfterTheFitOfAllPairs) {
+  simulation::Scenario scenario = ShortScenario(15.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kPanning);
+  scenario.camera.focal_px = 458.0;
+  scenario.tracks.count = 60;
+  scenario.tracks.noise_px = 0.5;
+  scenario.effects.radial_distortion.k1 = -0.28;
+  scenario.effects.radial_distortion.k2 = 0.07;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto report = Calibrate(s.recording, {});
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_THAT(report->notes, Contains(HasSubstr("radial_distortion is fitted as well")));
+  EXPECT_LT(ErrorInSigmas(report->calibration, s.truth).cwiseAbs().maxCoeff(), 4.5);
+  EXPECT_EQ(report->times.front().stage, "other fits");
+  EXPECT_GT(report->times.front().seconds, 0.0);
+}
+
 // Where the lens bends nothing, no start makes it bend: one that is wrong by a factor of 3 sends
 // the online estimate as far from it.
 TEST(CalibrateAstray, TakesInNothingThatTheDataDoNotBearOut) {
