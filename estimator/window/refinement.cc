@@ -267,8 +267,9 @@ class Refinement {
     if (options_.frame_times_alone && !result_.frame_times.empty()) {  // from the second round on
       options.settled = [this, last_s = graph_->Latents().frame_times_s]() mutable {
         auto now_s = graph_->Latents().frame_times_s;
-        std::swap(last_s, now_s);
-        return FrameTimesHaveSettled(result_.frame_times, now_s, last_s);
+        const bool settled = FrameTimesHaveSettled(result_.frame_times, last_s, now_s);
+        last_s = std::move(now_s);
+        return settled;
       };
     } else if (yardstick_) {
       options.settled = [&] {
