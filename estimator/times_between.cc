@@ -1,7 +1,6 @@
 #include "estimator/times_between.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <memory>
 #include <utility>
