@@ -12,9 +12,9 @@ namespace camgyro {
 
 // Own times of all frames (frame_stamp_jitter), also of those that SelectPairs leaves out: found
 // from the pairs of neighbours, stretch by stretch, with lens, shutter, mounting, bias and effects
-// held where `fit` has them, and its times as a start. Their sigmas are those of a frame's time beside a
-// calibration that is known. options: those of the fit. Returns the times of the fit where it
-// leaves no frame out or has no times, and in stretches whose neighbours cannot be fitted.
+// held where `fit` has them, and its times as a start. Their sigmas are those of a frame's time
+// beside a calibration that is known. options: those of the fit. Returns the times of the fit where
+// it leaves no frame out or has no times, and in stretches whose neighbours cannot be fitted.
 std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Refined& fit,
                                           const RefinementOptions& options);
 
