@@ -3,6 +3,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 namespace camgyro {
@@ -44,6 +45,17 @@ struct System {
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
 };
 
+// Where 2 log L is 1 less than that of the least spread, the most likely one, and falls.
+double LeastUnlikely(const std::function<double(double)>& two_log_likelihood) {
+  double low = std::log(kLeastSpreadS), high = std::log(kMostSpreadS);
+  const double limit = two_log_likelihood(low) - 1.0;
+  while (high - low > 1e-3) {
+    const double middle = 0.5 * (low + high);
+    (two_log_likelihood(middle) > limit ? low : high) = middle;
+  }
+  return std::exp(high);
+}
+
 double TwoLogLikelihood(System* system, double spread_s) {
   system->Factorise(spread_s);
   const Eigen::VectorXd solved = system->solver.solve(system->score);
@@ -59,7 +71,7 @@ double TwoLogLikelihood(const std::vector<PairTimes>& pairs, double spread_s) {
 }
 
 Spread MostLikelySpread(const std::vector<PairTimes>& pairs) {
-  if (pairs.empty()) return {kLeastSpreadS, kLeastSpreadS};
+  if (pairs.empty()) return {kLeastSpreadS, kMostSpreadS};
   System system(pairs);
   const auto value = [&](double log_s) { return TwoLogLikelihood(&system, std::exp(log_s)); };
   const double low = std::log(kLeastSpreadS), high = std::log(kMostSpreadS);
@@ -75,7 +87,7 @@ Spread MostLikelySpread(const std::vector<PairTimes>& pairs) {
       best = i;
     }
   }
-  if (best == 0) return {kLeastSpreadS, kLeastSpreadS};
+  if (best == 0) return {kLeastSpreadS, LeastUnlikely(value)};
   const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
   double a = low + (best - 1) * step, b = std::min(high, low + (best + 1) * step);
   double c = b - golden * (b - a), d = a + golden * (b - a);
@@ -115,6 +127,10 @@ std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, double s
     offsets.push_back({frame, mean[row], spread_s * std::sqrt(variance)});
   }
   return offsets;
+}
+
+std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const Spread& spread) {
+  return OffsetsOf(pairs, std::min(kMostSpreadS, std::hypot(spread.value_s, spread.sigma_s)));
 }
 
 }  // namespace camgyro

@@ -27,7 +27,8 @@ struct Spread {
 // say most likely, offsets integrated out:
 //   2 log L(s) = s^2 score . (I + s^2 W)^-1 score - log det(I + s^2 W)
 // with W the sum of the pairs' information. Within [kLeastSpreadS, kMostSpreadS]. sigma_s is from
-// the curvature of log L over log s; that of a spread at the least allowed is that least.
+// the curvature of log L over log s; that of a spread at the least allowed is where 2 log L has
+// fallen by 1: as large as it may be without being unlikely.
 constexpr double kLeastSpreadS = 1e-6, kMostSpreadS = 0.1;
 Spread MostLikelySpread(const std::vector<PairTimes>& pairs);
 
@@ -40,6 +41,10 @@ struct FrameOffset {
 };
 // Mean and standard deviation of each frame's offset given the spread, in the order of frames.
 std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, double spread_s);
+// The same of a spread that is known as well as its sigma says: offsets spread by the root of the
+// mean of its square. Where frames tell little, the most likely spread may be none at all, and
+// times taken for known to a microsecond would be no honest ones.
+std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const Spread& spread);
 
 }  // namespace camgyro
 

@@ -69,7 +69,7 @@ bool UpdateFrameTimes(double settled, PairGraph* graph, std::vector<FrameOffset>
   const std::vector<PairTimes> times = graph->FrameTimes();
   const Spread spread = MostLikelySpread(times);
   const double before_s = graph->frame_time_spread_s();
-  *offsets = OffsetsOf(times, spread.value_s);
+  *offsets = OffsetsOf(times, spread);
   graph->SetFrameTimeSpread(spread);
   return std::abs(spread.value_s - before_s) < std::max(kNothingS, settled * before_s);
 }
