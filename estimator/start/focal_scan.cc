@@ -27,6 +27,9 @@ constexpr double kDistinctLog = 0.22;    // 25 %
 constexpr double kMaxRunnerUp = 0.8;     // a wrong lens moves shallow minima far
 constexpr double kModelLog = 0.02;       // a lens that nothing declares bends it further
 constexpr double kUnknownLog = 0.3;      // what is known of any lens
+// Directions of the orientation that a motion determines which tells a focal length: one about a
+// single axis of the picture determines two.
+constexpr int kLeastAxes = 2;
 // Parts of the frame interval: what is taken where nothing tells, and its sigma; the largest sigma
 // of what is told.
 constexpr double kUsualReadout = 0.5;
@@ -232,17 +235,20 @@ class FocalScan {
           {point.trial.focal_px, point.loss.sum() / (curve.gyro_power() * best_px * best_px)});
     }
     focal.runner_up_ratio = curve.RunnerUpRatio(kDistinctLog);
-    auto [log_focal, sigma_log] = curve.Minimum();
-    sigma_log = std::hypot(sigma_log, kModelLog);
+    const auto [log_focal, spread_log] = curve.Minimum();
+    const double sigma_log = std::hypot(spread_log, kModelLog);
     focal.determined = sigma_log < kDeterminedLog && focal.runner_up_ratio < kMaxRunnerUp;
     best_focal_px_ = std::exp(log_focal);
-    if (!focal.determined) {
-      log_focal = log_guess_;
-      sigma_log = kUnknownLog;
-    }
     focal.value_px = std::exp(log_focal);
     focal.sigma_px = sigma_log * focal.value_px;
+    if (!focal.determined) LeaveOpen(&focal);
     return focal;
+  }
+
+  void LeaveOpen(StartFocal* focal) const {
+    focal->determined = false;
+    focal->value_px = std::exp(log_guess_);
+    focal->sigma_px = kUnknownLog * focal->value_px;
   }
 
   // The alignment anew, from rotations at the best focal length that are made with the last one.
@@ -383,6 +389,11 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   if (!recording.camera.readout_s) readout = scan.ScanReadouts();
   StartFocal focal = scan.ScanFocals(/*step=*/1);
   auto start = scan.StartAt(focal.value_px);
+  // Pan and tilt tell the focal length where the motion tells which of the gyro's they are.
+  if (start && focal.determined && start->rotation_axes_determined < kLeastAxes) {
+    scan.LeaveOpen(&focal);
+    start = scan.StartAt(focal.value_px);
+  }
   if (!start) return start;
   if (!focal.determined) {
     start->notes.push_back(

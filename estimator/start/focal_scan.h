@@ -32,9 +32,9 @@ struct FocalScanOptions {
 // without): the focal length whose pan and tilt fit the gyro best. The residual, in pixels, is
 // truncated at 3 sigma, its minimum refined by a parabola in log f; sigma from the parabola and
 // from how blocks of time disagree. Then FindStart at that focal length, with `focal` set. If
-// the motion does not tell (roll only, hardly any rotation) or the lens distorts so much that the
-// minimum is shallow, focal->determined is false, a note says so, and the recording's guess is
-// used, or 0.85 of the longer side without one.
+// the motion does not tell (roll only, hardly any rotation), not even how the camera's axes lie on
+// the gyro's, or the lens distorts so much that the minimum is shallow, focal->determined is false,
+// a note says so, and the recording's guess is used, or 0.85 of the longer side without one.
 //
 // All rotations but the first, which say how the gyro lies to the camera, are made with what is
 // known of that (RotationTrial::rough). The readout time, where the recording does not declare it,
