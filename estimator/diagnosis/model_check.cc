@@ -33,6 +33,10 @@ struct Tested {
   Eigen::VectorXd prior;  // information of all columns, candidates with their weak priors
 };
 
+// There are stretches enough to see how the scores scatter. Without, noise is all that is known of
+// what they say.
+bool Scatters(const Tested& t) { return t.scores.blocks.size() >= kLeastBlocks; }
+
 bool IsDeclared(const Recording& recording, const EffectEntry& entry) {
   const bool distortion =
       entry.name == "radial_distortion" || entry.name == "tangential_distortion";
@@ -80,9 +84,11 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
   const auto scores_of = [&](const std::vector<PairBlock>& blocks) {
     return ComputeScores(input, blocks, model, set, report.quality.noise_px, graph);
   };
-  const Scores fit = scores_of(shares.fit), choice = scores_of(shares.choice);
-  if (fit.blocks.empty() || choice.blocks.empty()) return t;
-  t.scores = MergeShares(fit, choice);
+  t.scores = MergeShares(scores_of(shares.fit), scores_of(shares.choice));
+  if (!Scatters(t)) {  // one stretch, of all pairs
+    AddMatches(recording, &input.pairs);
+    t.scores = scores_of({input.pairs});
+  }
   t.prior = PriorInformation(report.prior, model.effects.get(), *set);
   return t;
 }
@@ -215,7 +221,7 @@ std::optional<std::string> CheckModel(const Recording& recording, const Calibrat
   if (!report->residual->facts().with_effects) return std::nullopt;
   if (!(report->quality.noise_px > 0.0)) return std::nullopt;
   const Tested t = Score(recording, options, device, *report);
-  if (t.scores.blocks.size() < kLeastBlocks) return std::nullopt;
+  if (t.scores.blocks.empty()) return std::nullopt;
   std::vector<ScoreTest> alone;
   for (const Candidate& candidate : t.candidates) {
     alone.push_back(TestColumns(t.scores, candidate.columns(), t.prior));
@@ -224,7 +230,7 @@ std::optional<std::string> CheckModel(const Recording& recording, const Calibrat
   report->device_class = DeviceClassName(device);
   const Usual effects = UsualGiven(t, std::max(1.0, usual.variance));
   if (!effects.columns.empty()) {
-    ExplainHalves(t, effects, report);
+    if (Scatters(t)) ExplainHalves(t, effects, report);
     AddTotal(t, effects, report);
   }
   return Suspect(t, report->calibration, alone, usual);

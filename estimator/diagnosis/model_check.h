@@ -28,7 +28,8 @@ namespace camgyro {
 //   1 + tr((4 covariance)^-1 (X1 - X2) C (X1 - X2)') / kStateSize
 // of it. The covariance is divided by that as far as it was multiplied, since total has it.
 //
-// Nothing is filled for a recording that is too short for the scores (kLeastBlocks stretches), or
+// A recording that is too short for stretches that scatter (kLeastBlocks) has a total, in which the
+// residuals are taken for as noisy as the fit says, and no doubt. Nothing is filled for one that is
 // fitted with the residual of the transfer alone.
 std::optional<std::string> CheckModel(const Recording& recording, const CalibrateOptions& options,
                                       DeviceClass device, CalibrationReport* report);

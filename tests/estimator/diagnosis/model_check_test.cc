@@ -88,6 +88,20 @@ TEST(ModelCheck, TheTotalCoversAScaleThatNobodyDeclared) {
   EXPECT_LT(in_totals.cwiseAbs().maxCoeff(), 3.0) << in_totals.transpose();
 }
 
+// Too short for stretches that scatter: what effects may add is there all the same.
+TEST(ModelCheck, AShortRecordingHasATotalAndNoDoubt) {
+  const Calibrated c =
+      Check({"duration_s=1.5", "effects.gyro_scale={error: [0.015, 0.015, -0.015]}"},
+            DeviceClass::kPhone);
+  EXPECT_FALSE(c.doubt.has_value()) << *c.doubt;
+  const Calibration& found = c.report.calibration;
+  ASSERT_TRUE(found.sigma_total().has_value());
+  const StateVector total = *found.sigma_total();
+  EXPECT_GT(ShareOf(c.report, "gyro_scale")[kStateFocal], 0.003 * found.lens[kFocal]);
+  const StateVector in_totals = Difference(found, c.simulated.truth).cwiseQuotient(total);
+  EXPECT_LT(in_totals.cwiseAbs().maxCoeff(), 3.0) << in_totals.transpose();
+}
+
 bool SaysThatHalvesDisagree(const std::vector<std::string>& words) {
   return std::any_of(words.begin(), words.end(),
                      [](const std::string& w) { return w.rfind(kHalvesDoubt, 0) == 0; });
