@@ -57,7 +57,7 @@ void RepairStamps(StampsMode mode, Recording* recording) {
 
   recording->camera_stamps = FindStampClock(StampsOf(recording->frames)).report;
   StampReport& frames = *recording->camera_stamps;
-  const bool own_times = mode != StampsMode::kRecorded && frames.kind == StampKind::kArrival;
+  const bool own_times = mode != StampsMode::kRecorded && frames.kind != StampKind::kMeasured;
   if (frames.kind != StampKind::kMeasured) {
     recording->notes.push_back("frame stamps are " + DescribeStamps(frames) +
                                (own_times ? "; each frame has a time of its own in the fit" : ""));

@@ -79,6 +79,23 @@ TEST(RepairStamps, LeavesLateFramesToTheFit) {
   EXPECT_FALSE(recording.camera_stamps->repaired);
 }
 
+// Late frames of which many are missing: no clock is found behind them, but they are late as
+// before.
+TEST(RepairStamps, LeavesIrregularFramesToTheFit) {
+  std::mt19937 random(4);
+  std::exponential_distribution<double> work(1.0 / 12e-3);
+  Recording recording = LateRecording(2e-6);
+  for (size_t i = 1; i < recording.frames.size(); ++i) {
+    recording.frames[i].stamp_ns = StampAt(recording.frames[i - 1].stamp_ns, 25e-3 + work(random));
+  }
+  RepairStamps(StampsMode::kAuto, &recording);
+  EXPECT_EQ(recording.camera_stamps->kind, StampKind::kIrregular);
+  EXPECT_TRUE(recording.camera_stamps->repaired);
+  EXPECT_THAT(recording.notes, Contains(HasSubstr("each frame has a time of its own in the fit")));
+  RepairStamps(StampsMode::kRecorded, &recording);
+  EXPECT_FALSE(recording.camera_stamps->repaired);
+}
+
 TEST(RepairStamps, CleanStampsAreTouchedOnlyOnDemand) {
   const Recording clean = LateRecording(2e-6);
   Recording recording = clean;
