@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/standard_distortion.h"
+#include "estimator/start/focal_scan.h"
+
 namespace camgyro {
 namespace {
 
@@ -29,6 +32,25 @@ bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start)
   const double apart = std::abs(std::log(focal_px / start->value_px));
   return !(apart <
            std::max(kFarFromStart, kFarFromStartSigmas * start->sigma_px / start->value_px));
+}
+
+void LookThroughFittedLens(const Recording& recording, const CalibrateOptions& options,
+                           const CameraRotationsAt& rotations_at, CalibrationReport* report) {
+  const Calibration& c = report->calibration;
+  const LensParameters lens = c.FullLens();
+  if (recording.HasOnlyAttitudes() || !rotations_at || lens == c.lens ||
+      !IsFarFromRotations(c.lens[kFocal], report->start.focal)) {
+    return;
+  }
+  const DistortionCoefficients distortion =
+      StandardDistortion(c.distortion_model, lens, Eigen::Vector2d(c.width_px, c.height_px));
+  Recording with = recording;
+  with.camera.aspect_ratio = lens[kAspect];
+  with.camera.distortion_model = distortion.model;
+  with.camera.distortion.assign(distortion.k.data(), distortion.k.data() + 4);
+  const Result<StartResult> start =
+      FindStartFromPictures(with, rotations_at, options.start, options.focal_scan);
+  if (start) report->start.focal = start->focal;
 }
 
 std::string Implausible(const EffectSet::Item& item, const Calibration& fit,

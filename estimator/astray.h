@@ -9,6 +9,7 @@
 
 #include "core/calibration.h"
 #include "core/effects/catalogue.h"
+#include "core/recording.h"
 #include "estimator/calibrate.h"
 #include "estimator/start/find_start.h"
 
@@ -21,6 +22,13 @@ bool RanAway(double focal_px, double from_px);
 // lens that nothing declares moves theirs by 7 % (rms, docs/lab/start.md), and a fit's by any
 // factor.
 bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start);
+
+// Where the fit's focal length is far from that of the rotations, and the fit has found a
+// distortion that nothing declares: start.focal anew, of rotations seen through that lens. Without
+// it, the start may take any focal length for determined. rotations_at: may be empty; nothing is
+// done then.
+void LookThroughFittedLens(const Recording& recording, const CalibrateOptions& options,
+                           const CameraRotationsAt& rotations_at, CalibrationReport* report);
 
 // Beyond the range of real devices by more than so many of its sigmas, a value is not believed.
 constexpr double kImplausibleSigmas = 2.0;

@@ -76,6 +76,7 @@ class CalibrationJob {
     }
     if (options_.refine || !report_.online) {
       if (const Status done = Refinement(); !done) return tl::unexpected(done.error());
+      LookThroughFittedLens(recording_, options_, rotations_at, &report_);
       const double noise = report_.quality.noise_px;
       if (MayBeAstray(report_.calibration)) {
         if (auto better = TryWhatLeadsAstray(rotations_at, report_.calibration, noise)) {

@@ -10,8 +10,8 @@
 
 #include "core/effects/catalogue.h"
 #include "estimator/calibrate.h"
-#include "frontend/camera_rotations.h"
 #include "tests/estimator/simulated_input.h"
+#include "tests/rotations_of_pictures.h"
 
 namespace camgyro {
 namespace {
@@ -73,11 +73,31 @@ simulation::Scenario Room() {
 }
 
 Result<CalibrationReport> Calibrate(const Recording& recording, const CalibrateOptions& options) {
-  const auto rotations = [pairs = PairsForRotations(recording, 200)](
-                             const Recording& now, const std::vector<RotationTrial>& trials) {
-    return CameraRotationsOf(now, pairs, trials);
-  };
-  return CalibrateRecording(recording, rotations, options);
+  return CalibrateRecording(recording, RotationsOfPictures(recording, 200), options);
+}
+
+// A start that took a wrong focal length for determined is no reason to doubt a fit with a lens,
+// if the rotations through that lens have the fit's focal length.
+TEST(Astray, RotationsAreSeenThroughTheFittedLens) {
+  simulation::Scenario scenario = Room();
+  scenario.effects.radial_distortion.k1 = -0.28;
+  scenario.effects.radial_distortion.k2 = 0.07;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  CalibrationReport report;
+  report.calibration = s.truth;
+  report.start.focal = StartFocal{306.0, 7.0, /*determined=*/true, 0.5, {}};
+  LookThroughFittedLens(s.recording, {}, RotationsOfPictures(s.recording, 200), &report);
+  EXPECT_EQ(report.start.focal->value_px, 306.0);  // no lens was fitted
+
+  report.calibration.effects = std::make_shared<const EffectSet>(
+      MakeEffects("radial_distortion:radtan", MakeEffectSetup(s.recording, s.truth)).value());
+  report.calibration.effect_values = Eigen::Vector2d(-0.28, 0.07);
+  LookThroughFittedLens(s.recording, {}, nullptr, &report);
+  EXPECT_EQ(report.start.focal->value_px, 306.0);
+  LookThroughFittedLens(s.recording, {}, RotationsOfPictures(s.recording, 200), &report);
+  ASSERT_TRUE(report.start.focal->determined);
+  EXPECT_NEAR(report.start.focal->value_px, 458.0, 0.1 * 458.0);
+  EXPECT_FALSE(IsFarFromRotations(s.truth.lens[kFocal], report.start.focal));
 }
 
 // Without the lens's distortion, the focal length runs to six times of what it is.

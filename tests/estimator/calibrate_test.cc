@@ -8,8 +8,8 @@
 #include "core/usual_focal.h"
 #include "estimator/starting_point.h"
 #include "estimator/window/residuals/all_residuals.h"
-#include "frontend/camera_rotations.h"
 #include "tests/estimator/simulated_input.h"
+#include "tests/rotations_of_pictures.h"
 
 namespace camgyro {
 namespace {
@@ -17,14 +17,6 @@ namespace {
 using simulation::Scenario;
 using simulation::Simulated;
 using simulation::SimulateTracks;
-
-// Rotations from the pictures (frontend/two_view_rotation.h), as the command line makes them.
-CameraRotationsAt RotationsOf(const Recording& recording) {
-  return [pairs = PairsForRotations(recording, 100)](const Recording& now,
-                                                     const std::vector<RotationTrial>& trials) {
-    return CameraRotationsOf(now, pairs, trials);
-  };
-}
 
 TEST(CalibrateRecording, FindsTheTruthFromAPoorGuess) {
   Simulated s = SimulateTracks(ShortScenario(6.0)).value();
@@ -35,12 +27,13 @@ TEST(CalibrateRecording, FindsTheTruthFromAPoorGuess) {
   guess.readout_s.reset();
   guess.delay_s = s.truth.delay_s + 0.8;
   std::vector<std::string> stages;
-  const Result<CalibrationReport> report = CalibrateRecording(
-      s.recording, RotationsOf(s.recording), {}, [&](const std::string& stage, double done) {
-        EXPECT_GE(done, 0.0);
-        EXPECT_LE(done, 1.0);
-        if (stages.empty() || stages.back() != stage) stages.push_back(stage);
-      });
+  const Result<CalibrationReport> report =
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), {},
+                         [&](const std::string& stage, double done) {
+                           EXPECT_GE(done, 0.0);
+                           EXPECT_LE(done, 1.0);
+                           if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+                         });
   ASSERT_TRUE(report.has_value()) << report.error().message;
   EXPECT_THAT(stages, ::testing::ElementsAre("start", "window", "refinement"));
   EXPECT_TRUE(report->converged);
@@ -76,11 +69,13 @@ TEST(CalibrateRecording, RefinesTheMostInformativePairsOfALongOne) {
     scenario.seed = static_cast<uint64_t>(seed);
     const Simulated s = SimulateTracks(scenario).value();
     CalibrateOptions options;
-    const auto all = CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+    const auto all =
+        CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), options);
     ASSERT_TRUE(all.has_value()) << all.error().message;
     EXPECT_THAT(all->notes, ::testing::IsEmpty());
     options.most_refined_pairs = static_cast<size_t>(all->quality.pairs / 3);
-    const auto some = CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+    const auto some =
+        CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), options);
     ASSERT_TRUE(some.has_value()) << some.error().message;
     EXPECT_THAT(some->notes, ::testing::ElementsAre(::testing::HasSubstr("recording is long")));
     EXPECT_LE(some->quality.pairs, all->quality.pairs / 3);
@@ -89,7 +84,8 @@ TEST(CalibrateRecording, RefinesTheMostInformativePairsOfALongOne) {
     options.most_refined_pairs = 9000;
     options.most_bytes = 0.0;
     options.least_refined_bytes = 0.75 * 66e3 * all->quality.pairs;
-    const auto few = CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+    const auto few =
+        CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), options);
     ASSERT_TRUE(few.has_value()) << few.error().message;
     EXPECT_THAT(few->notes, ::testing::ElementsAre(::testing::HasSubstr("recording is long")));
     EXPECT_LT(few->quality.matches, 0.8 * all->quality.matches);
@@ -116,7 +112,7 @@ TEST(CalibrateRecording, MakesEffectsAnewThatDependOnTheDelay) {
   CalibrateOptions options;
   options.effects = "optical_stabilisation:0.5";
   const Result<CalibrationReport> report =
-      CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), options);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   const StateVector error = ErrorInSigmas(report->calibration, s.truth);
   EXPECT_LT(error.cwiseAbs().maxCoeff(), 5.0) << error.transpose();
@@ -133,7 +129,7 @@ TEST(CalibrateRecording, MakesEffectsAnewThatDependOnEffectsOnTime) {
   CalibrateOptions options;
   options.effects = "optical_stabilisation:0.5,delay_step:4.968";
   const Result<CalibrationReport> report =
-      CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), options);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   const Calibration& c = report->calibration;
   const double sigma = std::sqrt(c.effect_covariance(1, 1));
@@ -148,11 +144,8 @@ TEST(CalibrateRecording, TakesAClockThatRunsFastIntoTheModel) {
   scenario.tracks.count = 50;
   scenario.effects.clock_skew.ppm = 8000.0;
   const Simulated s = SimulateTracks(scenario).value();
-  const auto rotations = [pairs = PairsForRotations(s.recording, 400)](
-                             const Recording& now, const std::vector<RotationTrial>& trials) {
-    return CameraRotationsOf(now, pairs, trials);
-  };
-  const Result<CalibrationReport> report = CalibrateRecording(s.recording, rotations, {});
+  const Result<CalibrationReport> report =
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 400), {});
   ASSERT_TRUE(report.has_value()) << report.error().message;
   EXPECT_THAT(report->notes, ::testing::Contains(::testing::ContainsRegex(
                                  "clock runs 0\\.(79|80)[0-9] ± 0\\.00[0-9] % fast")));
@@ -178,7 +171,7 @@ TEST(CalibrateRecording, RefusesEffectsOfResidualsThatKnowNone) {
       MakeEffects("clock_skew", MakeEffectSetup(s.recording, s.truth)).value());
   options.from->effect_values = Eigen::VectorXd::Zero(1);
   const Result<CalibrationReport> report =
-      CalibrateRecording(s.recording, RotationsOf(s.recording), options);
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), options);
   ASSERT_FALSE(report.has_value());
   EXPECT_EQ(report.error().kind, ErrorKind::kBadUsage);
   EXPECT_THAT(report.error().message, ::testing::HasSubstr("clock_skew"));
@@ -190,7 +183,7 @@ TEST(CalibrateRecording, RefusesARecordingThatDoesNotTurn) {
   scenario.motion.rotation_rms_rad_s.setZero();
   const Simulated s = SimulateTracks(scenario).value();
   const Result<CalibrationReport> report =
-      CalibrateRecording(s.recording, RotationsOf(s.recording), {});
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), {});
   ASSERT_FALSE(report.has_value());
   EXPECT_EQ(report.error().kind, ErrorKind::kCannotEstimate);
   EXPECT_FALSE(report.error().message.empty());

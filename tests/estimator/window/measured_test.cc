@@ -5,10 +5,10 @@
 #include "core/so3.h"
 #include "estimator/calibrate.h"
 #include "estimator/start/focal_scan.h"
-#include "frontend/camera_rotations.h"
 #include "frontend/readers/read_recording.h"
 #include "frontend/track_recording.h"
 #include "tests/measured_data.h"
+#include "tests/rotations_of_pictures.h"
 
 namespace camgyro {
 namespace {
@@ -26,13 +26,7 @@ Result<CalibrationReport> Calibrate(Recording* recording) {
     const auto tracked = TrackRecording({}, nullptr, nullptr, recording);
     if (!tracked) return tl::unexpected(tracked.error());
   }
-  const std::vector<FramePair> pairs = PairsForRotations(*recording, 400);
-  return CalibrateRecording(
-      *recording,
-      [&](const Recording& now, const std::vector<RotationTrial>& trials) {
-        return CameraRotationsOf(now, pairs, trials);
-      },
-      CalibrateOptions());
+  return CalibrateRecording(*recording, RotationsOfPictures(*recording, 400), CalibrateOptions());
 }
 
 double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
@@ -100,13 +94,8 @@ TEST(Measured, StartThatSeesNoAxesTellsNoFocalLength) {
   for (GyroSample& sample : recording.gyro) sample.stamp_ns = whole_ms(sample.stamp_ns);
   const auto tracked = TrackRecording({}, nullptr, nullptr, &recording);
   ASSERT_TRUE(tracked.has_value()) << tracked.error().message;
-  const std::vector<FramePair> pairs = PairsForRotations(recording, 400);
-  const auto start = FindStartFromPictures(
-      recording,
-      [&](const Recording& now, const std::vector<RotationTrial>& trials) {
-        return CameraRotationsOf(now, pairs, trials);
-      },
-      StartOptions());
+  const auto start =
+      FindStartFromPictures(recording, RotationsOfPictures(recording, 400), StartOptions());
   ASSERT_TRUE(start.has_value()) << start.error().message;
   ASSERT_TRUE(start->focal.has_value());
   if (start->focal->determined) {
