@@ -299,6 +299,7 @@ class CalibrationJob {
     if (!online) return online;
     if (!refined && report_.online) {  // a window that has run away, to a lens without rays
       refined = RefineWith(refinement, from_start_, std::nullopt);
+      report_.online.reset();  // nothing to hold the fit against
       report_.notes.push_back(
           "the online estimate leads nowhere; all frames fitted from the start");
     }
