@@ -21,6 +21,7 @@ import numpy as np
 import yaml
 
 from calibration_errors import NAMES, multiply
+from recording_copy import copy_recording
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 DATA = os.path.abspath(os.environ.get("CAMGYRO_DATA", os.path.join(SOURCE, "../shared/data")))
@@ -102,19 +103,8 @@ def known_of(name, known):
 
 def with_lens(recording, folder):
     """A copy of the recording (links) whose sensor.yaml declares the lens distortion."""
-    copy = os.path.join(folder, os.path.basename(recording))
-    os.makedirs(os.path.join(copy, "cam0"))
-    os.symlink(os.path.join(recording, "imu0"), os.path.join(copy, "imu0"))
-    for name in os.listdir(os.path.join(recording, "cam0")):
-        source = os.path.join(recording, "cam0", name)
-        if name != "sensor.yaml":
-            os.symlink(source, os.path.join(copy, "cam0", name))
-            continue
-        with open(source, encoding="utf-8") as file, \
-                open(os.path.join(copy, "cam0", name), "w", encoding="utf-8") as out:
-            for line in file:
-                out.write(LENS if line.startswith("intrinsics:") else line)
-    return copy
+    return copy_recording(recording, os.path.join(folder, os.path.basename(recording)),
+                          sensor=lambda text: re.sub(r"(?m)^intrinsics:.*\n", LENS, text))
 
 
 def rotation(known, q):

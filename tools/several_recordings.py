@@ -14,33 +14,21 @@ import tempfile
 
 import yaml
 
+from recording_copy import copy_recording, frame_stamps
+
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 def cut(recording, parts, folder):
     """Folders of the stretches of a recording in the EuRoC layout, below `folder`."""
-    camera = recording + "/cam0"
-    tables = [f for f in os.listdir(camera) if f.endswith(".csv")]
-    rows = {}
-    for table in tables:
-        with open(camera + "/" + table, encoding="utf-8") as file:
-            rows[table] = file.readlines()
-    stamps = sorted({int(row.split(",")[0]) for lines in rows.values() for row in lines
-                     if row[0].isdigit()})
+    stamps = frame_stamps(recording)
     first, span = stamps[0], stamps[-1] + 1 - stamps[0]
     made = []
     for part in range(parts):
-        made.append("%s/%s_%d" % (folder, os.path.basename(recording.rstrip("/")), part + 1))
-        os.makedirs(made[-1] + "/cam0")
-        os.symlink(os.path.abspath(recording + "/imu0"), made[-1] + "/imu0")
-        for name in os.listdir(camera):
-            if name not in tables:
-                os.symlink(os.path.abspath(camera + "/" + name), made[-1] + "/cam0/" + name)
         begin, end = (first + span * p // parts for p in (part, part + 1))
-        for table, lines in rows.items():
-            with open(made[-1] + "/cam0/" + table, "w", encoding="utf-8") as file:
-                file.writelines(row for row in lines if not row[0].isdigit()
-                                or begin <= int(row.split(",")[0].split(".")[0]) < end)
+        made.append(copy_recording(
+            recording, "%s/%s_%d" % (folder, os.path.basename(recording.rstrip("/")), part + 1),
+            keep=lambda ns, begin=begin, end=end: begin <= ns < end))
     return made
 
 
