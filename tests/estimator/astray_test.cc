@@ -72,6 +72,14 @@ simulation::Scenario Room() {
   return scenario;
 }
 
+// The same with a lens like that of EuRoC's drone.
+simulation::Scenario RoomThroughALens() {
+  simulation::Scenario scenario = Room();
+  scenario.effects.radial_distortion.k1 = -0.28;
+  scenario.effects.radial_distortion.k2 = 0.07;
+  return scenario;
+}
+
 Result<CalibrationReport> Calibrate(const Recording& recording, const CalibrateOptions& options) {
   return CalibrateRecording(recording, RotationsOfPictures(recording, 200), options);
 }
@@ -79,10 +87,7 @@ Result<CalibrationReport> Calibrate(const Recording& recording, const CalibrateO
 // A start that took a wrong focal length for determined is no reason to doubt a fit with a lens,
 // if the rotations through that lens have the fit's focal length.
 TEST(Astray, RotationsAreSeenThroughTheFittedLens) {
-  simulation::Scenario scenario = Room();
-  scenario.effects.radial_distortion.k1 = -0.28;
-  scenario.effects.radial_distortion.k2 = 0.07;
-  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const simulation::Simulated s = simulation::SimulateTracks(RoomThroughALens()).value();
   CalibrationReport report;
   report.calibration = s.truth;
   report.start.focal = StartFocal{306.0, 7.0, /*determined=*/true, 0.5, {}};
@@ -102,10 +107,7 @@ TEST(Astray, RotationsAreSeenThroughTheFittedLens) {
 
 // Without the lens's distortion, the focal length runs to six times of what it is.
 TEST(CalibrateAstray, TakesInALensThatNobodyHasDeclared) {
-  simulation::Scenario scenario = Room();
-  scenario.effects.radial_distortion.k1 = -0.28;
-  scenario.effects.radial_distortion.k2 = 0.07;
-  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const simulation::Simulated s = simulation::SimulateTracks(RoomThroughALens()).value();
   CalibrateOptions options;
   options.try_what_leads_astray = false;
   const auto plain = Calibrate(s.recording, options);
