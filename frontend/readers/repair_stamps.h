@@ -14,9 +14,10 @@ enum class StampsMode {
 
 // Sets gyro_stamps and camera_stamps of the recording, and with them the stamps of gyro and
 // accelerometer, strictly increasing afterwards; notes what was found. Frames keep their stamps:
-// how late each of them is, their pictures tell better. Where no steady clock explains frame stamps,
-// as times of arrival or at all, camera_stamps->repaired has the fit begin with frame_stamp_jitter
-// (not if kRecorded): a camera whose intervals vary turns out to have a spread of nothing.
+// how late each of them is, their pictures tell better. Where no steady clock explains frame
+// stamps, as times of arrival or at all, camera_stamps->repaired has the fit begin with
+// frame_stamp_jitter (not if kRecorded): a camera whose intervals vary turns out to have a spread
+// of nothing.
 void RepairStamps(StampsMode mode, Recording* recording);
 
 }  // namespace camgyro
