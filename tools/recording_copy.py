@@ -5,9 +5,9 @@ import os
 def copy_recording(recording, folder, keep=None, stamp=None, gyro=None, sensor=None):
     """Makes `folder` a copy of `recording`, changed by what is given, and returns it.
 
-    keep(stamp): whether a frame stays; stamp(stamp): its stamp in the copy (both in ns, as integers;
-    rows about several frames stay if all do). gyro(index, row): the row in the copy, as a list of
-    texts, or None; sensor(text): that of cam0/sensor.yaml.
+    keep(stamp): whether a frame stays; stamp(stamp): its stamp in the copy (both integers [ns]; rows
+    about several frames stay if all do). gyro(index, row): the row in the copy, as a list of texts,
+    or None; sensor(text): that of cam0/sensor.yaml.
     """
     for sub in sorted(os.listdir(recording)):
         source = os.path.join(os.path.abspath(recording), sub)
