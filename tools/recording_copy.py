@@ -5,7 +5,7 @@ import os
 def copy_recording(recording, folder, keep=None, stamp=None, gyro=None, sensor=None):
     """Makes `folder` a copy of `recording`, changed by what is given, and returns it.
 
-    keep(stamp): whether a frame stays; stamp(stamp): its stamp in the copy (both integers [ns]; rows
+    keep(stamp): whether a frame stays; stamp(stamp): its stamp in the copy (integers, ns); rows
     about several frames stay if all do). gyro(index, row): the row in the copy, as a list of texts,
     or None; sensor(text): that of cam0/sensor.yaml.
     """
