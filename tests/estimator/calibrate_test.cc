@@ -4,10 +4,13 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Cholesky>
+#include <random>
+#include <vector>
 
 #include "core/usual_focal.h"
 #include "estimator/starting_point.h"
 #include "estimator/window/residuals/all_residuals.h"
+#include "frontend/readers/repair_stamps.h"
 #include "tests/estimator/simulated_input.h"
 #include "tests/rotations_of_pictures.h"
 
@@ -136,6 +139,35 @@ TEST(CalibrateRecording, MakesEffectsAnewThatDependOnEffectsOnTime) {
   EXPECT_NEAR(c.effect_values[1], 0.010, 4.0 * sigma);
   EXPECT_LT(sigma, 5e-4);
   EXPECT_NEAR(c.delay_s, s.truth.delay_s, 4.0 * c.sigma()[kStateDelay]);
+}
+
+// A camera whose intervals really vary, by no clock: its frames have times of their own in the fit,
+// which come out as their stamps.
+TEST(CalibrateRecording, BelievesStampsOfVaryingIntervals) {
+  Scenario scenario = ShortScenario(8.0);
+  scenario.camera.rate_hz = 1000.0;
+  Simulated s = SimulateTracks(scenario).value();
+  Recording& recording = s.recording;
+  std::mt19937 random(2);
+  std::exponential_distribution<double> wait(1.0 / 12.0);
+  std::vector<Frame> frames;
+  std::vector<std::vector<TrackedPoint>> tracks;
+  for (size_t i = 0; i < recording.frames.size(); i += 25 + static_cast<size_t>(wait(random))) {
+    frames.push_back(recording.frames[i]);
+    tracks.push_back(recording.tracks[i]);
+  }
+  recording.frames = frames;
+  recording.tracks = tracks;
+  RepairStamps(StampsMode::kAuto, &recording);
+  ASSERT_EQ(recording.camera_stamps->kind, StampKind::kIrregular);
+  const Result<CalibrationReport> report =
+      CalibrateRecording(recording, RotationsOfPictures(recording, 100), {});
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  const Calibration& c = report->calibration;
+  ASSERT_NE(c.effects, nullptr);
+  ASSERT_TRUE(c.effects->Has("frame_stamp_jitter"));
+  EXPECT_LT(c.effect_values[c.effects->frame_time_spread()], 0.4e-3);
+  EXPECT_LT(ErrorInSigmas(c, s.truth).cwiseAbs().maxCoeff(), 4.0);
 }
 
 // Within 24 s the delay moves by 0.19 s. The start finds it, and says so.
