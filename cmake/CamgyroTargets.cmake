@@ -59,7 +59,7 @@ function(camgyro_test folder)
     target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/${folder}/${source})
   endforeach()
   target_link_libraries(${target} PRIVATE ${ARG_DEPS} GTest::gmock camgyro_build_flags)
-  # What is tested are the libraries; the tests' own code compiles in 0.7 of the time of -O3.
+  # What is tested are the libraries, which keep -O3; the tests' own code is to compile quickly.
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
   string(JOIN ":" slow ${ARG_SLOW})
   set(entries ${CMAKE_CURRENT_BINARY_DIR}/${target}_entries.cmake)

@@ -89,19 +89,17 @@ def half_turn(recording, folder):
     copy_recording(recording, folder, sensor=without_mounting)
     width, height = size_of(recording)
     camera = os.path.join(folder, "cam0")
-    for name, first in (("tracks.csv", 2), ("matches.csv", 2)):
-        path = os.path.join(camera, name)
-        if not os.path.exists(path):
-            continue
-        with open(path, encoding="utf-8") as file:
+    tracks = os.path.join(camera, "tracks.csv")
+    if os.path.exists(tracks):
+        with open(tracks, encoding="utf-8") as file:
             lines = file.read().splitlines()
-        os.remove(path)
-        with open(path, "w", encoding="utf-8") as out:
+        os.remove(tracks)
+        with open(tracks, "w", encoding="utf-8") as out:
             for line in lines:
                 cells = line.split(",")
                 if line[:1].isdigit():
-                    cells[first:] = ["%.3f" % ((width, height)[i % 2] - 1 - float(cell))
-                                     for i, cell in enumerate(cells[first:])]
+                    cells[2:4] = ["%.3f" % (size - 1 - float(cell))
+                                  for size, cell in zip((width, height), cells[2:4])]
                 out.write(",".join(cells) + "\n")
     pictures = os.path.join(camera, "data")
     if os.path.exists(pictures):
