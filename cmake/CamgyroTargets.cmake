@@ -47,11 +47,13 @@ function(camgyro_library name)
   set_property(GLOBAL APPEND PROPERTY CAMGYRO_LIBRARIES camgyro_${name})
 endfunction()
 
-# camgyro_test(FOLDER SOURCES ... DEPS ... SLOW ...): one binary per folder, test_FOLDER with _ for /,
-# one ctest entry per GoogleTest suite. SLOW: GoogleTest patterns of the tests that go into entries of
-# their own, with the label `slow`, which CI's sanitizer run omits.
+# camgyro_test(FOLDER SOURCES ... DEPS ... SLOW ... LONG ...): one binary per folder, test_FOLDER with
+# _ for /, one ctest entry per GoogleTest suite. SLOW: GoogleTest patterns of the tests that go into
+# entries of their own, with the label `slow`, which CI's sanitizer run omits. LONG: the same, with the
+# label `long` besides, which CI omits altogether; of simulated recordings only, and where other tests
+# run the same code.
 function(camgyro_test folder)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "SOURCES;DEPS;SLOW")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "SOURCES;DEPS;SLOW;LONG")
   string(REPLACE "/" "_" name ${folder})
   set(target test_${name})
   add_executable(${target} $<TARGET_OBJECTS:camgyro_test_main>)
@@ -62,10 +64,11 @@ function(camgyro_test folder)
   # What is tested are the libraries, which keep -O3; the tests' own code is to compile quickly.
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
   string(JOIN ":" slow ${ARG_SLOW})
+  string(JOIN ":" long ${ARG_LONG})
   set(entries ${CMAKE_CURRENT_BINARY_DIR}/${target}_entries.cmake)
   add_custom_command(TARGET ${target} POST_BUILD VERBATIM
     COMMAND ${CMAKE_COMMAND} -DBINARY=$<TARGET_FILE:${target}> -DPREFIX=${name} "-DSLOW=${slow}"
-            -DOUTPUT=${entries} -P ${PROJECT_SOURCE_DIR}/cmake/CamgyroDiscoverSuites.cmake)
+            "-DLONG=${long}" -DOUTPUT=${entries} -P ${PROJECT_SOURCE_DIR}/cmake/CamgyroDiscoverSuites.cmake)
   # Until it is built, ctest has one entry for it, which fails.
   file(CONFIGURE OUTPUT ${target}_include.cmake @ONLY CONTENT
        "if(EXISTS [==[@entries@]==])\n  include([==[@entries@]==])\nelse()\n  add_test(@name@.NOT_BUILT @target@)\nendif()\n")
