@@ -15,6 +15,11 @@
 namespace camgyro {
 namespace {
 
+// A translation that explains so much of the variance of the residuals of a rotation alone is
+// there, and the rotation fitted with it is near the truth. Without one, that rotation is a median
+// of 1.1 mrad off, more than three of its sigmas (EstimateCameraRotation.PureRotationWorks).
+constexpr double kExplained = 0.5;
+
 // A motion and the spread of its residuals [px].
 struct Candidate {
   double spread_px = 0.0;
@@ -127,7 +132,14 @@ RotationFit FitRotationAndTranslation(const std::vector<RayMatch>& matches, doub
     rad_per_px += std::sqrt(0.5) * match.J_b_px.norm() / static_cast<double>(matches.size());
   }
   const double excess = 2.0 * std::max(0.0, alone.variance_px - joint.variance_px);
-  const double bias_sq = 2.0 * excess * rad_per_px * rad_per_px;
+  double bias_sq = 2.0 * excess * rad_per_px * rad_per_px;
+  // The mean is more than that where all points are at similar distances, as in a room. It shows in
+  // what the two rotations differ by, beyond the noise of that.
+  if (joint.variance_px < (1.0 - kExplained) * alone.variance_px) {
+    const Eigen::Quaterniond apart(Eigen::Matrix3d(joint.R_a_b.transpose() * alone.R_a_b));
+    const double noise_sq = joint.covariance->trace() - alone.covariance->trace();
+    bias_sq = std::max(bias_sq, (Log(apart).squaredNorm() - noise_sq) / 3.0);
+  }
   *alone.covariance += bias_sq * Eigen::Matrix3d::Identity();
   return alone.covariance->trace() < joint.covariance->trace() ? alone : joint;
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """How good a start is: simulates recordings, runs `camgyro delay` on them, and prints for each kind
-of motion what the delay, the focal length and the readout time of the start differ by from the truth.
+of motion, and for a walk round a room, what the delay, the focal length and the readout time of the
+start differ by from the truth.
 
     tools/measure_start.py [--camgyro PATH] [--seeds N] [--duration_s S] [--jobs N] [KEY=VALUE...]
 
@@ -19,7 +20,8 @@ import numpy as np
 import yaml
 
 SOURCE = dirname(dirname(abspath(__file__)))
-MOTIONS = ("walking", "running", "handheld", "slow", "panning", "rotation")
+SCENARIOS = ("motion_walking", "motion_running", "motion_handheld", "motion_slow", "motion_panning",
+             "motion_rotation", "scene_room")
 NUMBER = r"(-?[0-9.]+)"
 
 
@@ -32,11 +34,11 @@ def found(text):
             for match in (delay, focal, readout)]
 
 
-def measure(camgyro, motion, seed, duration_s, changes):
+def measure(camgyro, scenario, seed, duration_s, changes):
     """Of the delay [ms], the focal length [%] and the readout time [ms]: error and sigma, or
     nothing; None if the recording is refused."""
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([camgyro, "simulate", SOURCE + "/tools/scenarios/motion_%s.yaml" % motion,
+        subprocess.run([camgyro, "simulate", SOURCE + "/tools/scenarios/%s.yaml" % scenario,
                         "seed=%d" % seed, "duration_s=%g" % duration_s, "tracks.noise_px=0.5",
                         *changes, "--out", folder + "/r"], check=True, stdout=subprocess.DEVNULL)
         with open(folder + "/r/truth.yaml", encoding="utf-8") as file:
@@ -75,14 +77,14 @@ def main():
     print("| Motion | refused | delay [ms] | focal length [%] | readout [ms] |")
     print("| --- | --- | --- | --- | --- |")
     with ThreadPoolExecutor(options.jobs) as pool:
-        for motion in MOTIONS:
-            runs = list(pool.map(lambda seed, m=motion: measure(
-                options.camgyro, m, seed, options.duration_s, options.changes),
+        for scenario in SCENARIOS:
+            runs = list(pool.map(lambda seed, s=scenario: measure(
+                options.camgyro, s, seed, options.duration_s, options.changes),
                                  range(1, options.seeds + 1)))
             good = [run for run in runs if run]
             cells = [cell([run[k] for run in good if run[k]], len(good)) for k in range(3)]
-            print("| %s | %d | %s |" % (motion, len(runs) - len(good), " | ".join(cells)),
-                  flush=True)
+            print("| %s | %d | %s |" % (scenario.split("_")[1], len(runs) - len(good),
+                                        " | ".join(cells)), flush=True)
 
 
 if __name__ == "__main__":
