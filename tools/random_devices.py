@@ -4,12 +4,15 @@ class usually show and declared by nobody, and prints how the errors compare wit
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
                             [--motions NAME,...] [--clean] [--diagnose] [--jobs N] [--camgyro PATH]
+                            [KEY=VALUE ...]
 
 The sizes are those of the class in estimator/diagnosis/device_class.cc, read from that file. --clean
 draws nothing: for how often a doubt is said of a device that has no effect. --diagnose: what
-`diagnose` makes of the devices, instead of `calibrate`. Prints a table by parameter: part of the
+`diagnose` makes of the devices, instead of `calibrate`. KEY=VALUE changes the scenario of all
+recordings, as in `camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the
 errors within 3 sigma_total, their rms in sigma_total, the median of sigma_total [px, s, rad/s, rad]
-and what that is of the spread of the errors, and the NEES per parameter with the total covariance.
+and what that is of the spread of the errors, the recordings with errors beyond 3 sigma_total, and
+the NEES per parameter with the total covariance.
 """
 import argparse
 import os
@@ -79,8 +82,8 @@ def run(options, seed):
         recording, out = folder + "/recording", folder + "/out"
         with open(folder + "/scenario.yaml", "w", encoding="utf-8") as file:
             yaml.safe_dump(scenario, file)
-        subprocess.run([options.camgyro, "simulate", folder + "/scenario.yaml", "--out", recording],
-                       check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([options.camgyro, "simulate", folder + "/scenario.yaml", *options.changes,
+                        "--out", recording], check=True, stdout=subprocess.DEVNULL)
         command = "diagnose" if options.diagnose else "calibrate"
         done = subprocess.run([options.camgyro, command, recording, "--out", out,
                                "--device", options.device],
@@ -92,14 +95,16 @@ def run(options, seed):
             calibration = yaml.safe_load(file)
         with open(recording + "/truth.yaml", encoding="utf-8") as file:
             truth = yaml.safe_load(file)
-        doubt = "the pictures show something" in done.stdout
+        doubts = ["the pictures show something" in done.stdout,
+                  "the two halves of the recording disagree" in done.stdout]
         if not options.clean:
             as_fitted(truth, recording, options.duration)
         error, noise = errors(calibration, truth)
         total = np.array(calibration["covariance"]["total"])
         determined = np.array([name not in calibration["quality"]["unobservable"]
                                for name in calibration["covariance"]["order"]])
-        return dict(error=error, noise=noise, total=total, doubt=doubt, determined=determined)
+        return dict(error=error, noise=noise, total=total, doubts=doubts, determined=determined,
+                    name="%s %d" % (motion, seed))
 
 
 def as_fitted(truth, recording, duration_s):
@@ -127,6 +132,7 @@ def main():
     parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
+    parser.add_argument("changes", nargs="*", metavar="KEY=VALUE")
     options = parser.parse_args()
     options.motions = options.motions.split(",")
     first, last = (options.seeds.split("-") * 2)[:2]
@@ -139,9 +145,9 @@ def main():
     noise = np.array([r["noise"] for r in results])
     used = np.array([r["determined"] for r in results])
     z = np.where(used, error / sigma, np.nan)
-    print("%d of %d devices of class %s%s calibrated; a doubt of the model in %d" % (
-        len(results), len(seeds), options.device, ", clean" if options.clean else "",
-        sum(r["doubt"] for r in results)))
+    print("%d of %d devices of class %s%s calibrated; a doubt of the model in %d, of the halves in %d"
+          % (len(results), len(seeds), options.device, ", clean" if options.clean else "",
+             *np.sum([r["doubts"] for r in results], axis=0)))
     print("| parameter | determined | within 3 sigma_total | rms error in sigma_total | "
           "sigma_total | sigma_total / spread of errors | rms error in sigma of noise |")
     print("| --- " * 7 + "|")
@@ -152,9 +158,15 @@ def main():
         spread = 1.4826 * np.median(np.abs(error[of, i]))
         print("| %s | %d | %.1f %% | %.2f | %.2g | %.2f | %.1f |" % (
             name, of.sum(), 100 * np.nanmean(np.abs(z[of, i]) < 3), np.sqrt(np.nanmean(z[of, i]**2)),
-            np.median(sigma[of, i]), np.median(sigma[of, i]) / spread, np.sqrt(np.mean((error[of, i] / noise[of, i])**2))))
-    print("| all | %d | %.2f %% | %.2f | | | |" % (used.sum(), 100 * np.mean(np.abs(z[used]) < 3),
-                                               np.sqrt(np.mean(z[used]**2))))
+            np.median(sigma[of, i]), np.median(sigma[of, i]) / spread,
+            np.sqrt(np.mean((error[of, i] / noise[of, i])**2))))
+    print("| all | %d | %.2f %% | %.2f | | | %.2f |" % (
+        used.sum(), 100 * np.mean(np.abs(z[used]) < 3), np.sqrt(np.mean(z[used]**2)),
+        np.sqrt(np.mean((error[used] / noise[used])**2))))
+    for r, errors_in_sigmas in zip(results, z):
+        if np.any(np.abs(errors_in_sigmas) > 3):
+            print("beyond 3 sigma_total in %s:" % r["name"], ", ".join(
+                "%s %.1f" % pair for pair in zip(NAMES, errors_in_sigmas) if abs(pair[1]) > 3))
     nees = [r["error"] @ np.linalg.solve(r["total"], r["error"]) / len(NAMES) for r in results]
     print("NEES per parameter with the total covariance: mean %.2f, median %.2f" % (
         np.mean(nees), np.median(nees)))
