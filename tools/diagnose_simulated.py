@@ -155,8 +155,8 @@ def run(options, case):
                 result["parameters"] = ", ".join(
                     "%s %.3g ± %.2g %s" % (p["name"], p["value"], p["sigma"], p["unit"])
                     for p in chosen.get("parameters", [])[:3])
-            else:
-                result["added"] = verdict["effects"]
+            # What was found at the start was in the fit before the first round.
+            result["added"] += [e for e in verdict["effects"] if e not in result["added"]]
         if case["effects"] and not set(case["effects"]) & set(NOT_FITTED):
             declared = ",".join(shapes.get(effect, effect) for effect in case["effects"])
             subprocess.run([options.camgyro, "calibrate", recording, "--effects", declared,
