@@ -123,8 +123,8 @@ TEST(CameraRotationsOf, AGyroUndoesTheRollingShutter) {
 }
 
 // On a circle through a room the camera steps sideways all the time, past points at similar
-// distances. Taken for rotations, these steps add up to a turn that the gyro does not feel: where a
-// sixth of the pairs did so, to 5 mrad per pair, and the start's bias was 0.2 rad/s.
+// distances. Taken for rotations, as they were in some of the pairs (5 mrad in the mean of all),
+// these steps add up to a turn that the gyro does not feel, and the start makes a bias of it.
 TEST(CameraRotationsOf, StepsThroughARoomAreNoTurn) {
   simulation::Scenario scenario;
   scenario.seed = 14;
