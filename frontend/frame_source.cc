@@ -1,9 +1,12 @@
 #include "frontend/frame_source.h"
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "frontend/readers/ffmpeg.h"
 #include "frontend/readers/formats.h"
@@ -19,6 +22,11 @@ class ImageFrames : public FrameSource {
   ImageFrames(const Recording& recording, PictureFormat format)
       : FrameSource(recording), format_(format) {}
 
+  Status SkipTo(size_t frame) override {
+    next_ = std::max(next_, frame);
+    return {};
+  }
+
  protected:
   Result<bool> Decode(Decoded* decoded) override {
     if (next_ == recording_.frames.size()) return false;
@@ -28,7 +36,7 @@ class ImageFrames : public FrameSource {
     if (!image) return tl::unexpected(image.error());
     decoded->width_px = image->cols;
     decoded->height_px = image->rows;
-    decoded->place = Concat(file, ": frame ", ++next_);
+    decoded->place = Concat(file, ": frame ", next_ + 1);
     if (gray) {
       decoded->picture = std::move(*image);
     } else {
@@ -40,7 +48,6 @@ class ImageFrames : public FrameSource {
 
  private:
   const PictureFormat format_;
-  size_t next_ = 0;
 };
 
 class VideoFrames : public FrameSource {
@@ -69,6 +76,22 @@ class VideoFrames : public FrameSource {
     return {};
   }
 
+  Status SkipTo(size_t frame) override {
+    if (frame <= next_ || frame >= recording_.frames.size()) return FrameSource::SkipTo(frame);
+    const size_t picture = recording_.PictureOf(frame);
+    const std::optional<int64_t> time = TimeOf(picture);
+    if (!time) return FrameSource::SkipTo(frame);
+    if (!Seek(*time)) {  // somewhere in the file now: from its beginning
+      if (Status opened = Open(); !opened) return opened;
+      pictures_ = next_ = 0;
+      return FrameSource::SkipTo(frame);
+    }
+    at_picture_ = true;
+    pictures_ = picture;
+    next_ = frame;
+    return {};
+  }
+
  protected:
   Result<bool> Decode(Decoded* decoded) override {
     const size_t expected = recording_.frames.size();
@@ -88,7 +111,7 @@ class VideoFrames : public FrameSource {
       return BadInput(
           Concat(File(), ": has a frame ", next_ + 1, ", expected ", expected, " frames"));
     }
-    if (frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
+    if (Damaged()) {
       return BadInput(Concat(File(), ": frame ", next_ + 1, " is damaged"));
     }
     decoded->width_px = frame_->width;
@@ -98,15 +121,41 @@ class VideoFrames : public FrameSource {
       return tl::unexpected(converted.error());
     }
     av_frame_unref(frame_.get());
-    ++next_;
     return true;
   }
 
  private:
   const std::string& File() const { return recording_.video_file; }
 
+  bool Damaged() const {
+    return frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0;
+  }
+
+  // The time of a picture in the stream's units. Nothing where the file does not say it.
+  std::optional<int64_t> TimeOf(size_t picture) {
+    if (!stamps_ns_) {
+      const Result<VideoContainer> container = ReadVideoContainer(File());
+      stamps_ns_ = container ? container->stamps_ns : std::vector<int64_t>();
+    }
+    if (picture >= stamps_ns_->size()) return std::nullopt;
+    return av_rescale_q((*stamps_ns_)[picture], AVRational{1, 1000000000},
+                        format_->streams[stream_]->time_base);
+  }
+
+  // Decodes up to the picture of that time, from the key picture before. False if it is not there.
+  bool Seek(int64_t time) {
+    if (av_seek_frame(format_.get(), stream_, time, AVSEEK_FLAG_BACKWARD) < 0) return false;
+    avcodec_flush_buffers(codec_.get());
+    for (;;) {
+      const Result<bool> received = Receive();
+      if (!received || !*received || frame_->pts > time) return false;
+      if (frame_->pts == time) return !Damaged();
+    }
+  }
+
   // The next picture into frame_; false at the end of the file.
   Result<bool> Receive() {
+    if (std::exchange(at_picture_, false)) return true;
     for (;;) {
       int code = avcodec_receive_frame(codec_.get(), frame_.get());
       if (code >= 0) return true;
@@ -185,8 +234,9 @@ class VideoFrames : public FrameSource {
   FfmpegPtr<AVPacket> packet_;
   FfmpegPtr<AVFrame> frame_, converted_;
   int stream_ = -1;
-  size_t pictures_ = 0;  // received
-  size_t next_ = 0;      // frame
+  std::optional<std::vector<int64_t>> stamps_ns_;  // of all pictures, once they were needed
+  size_t pictures_ = 0;                            // received
+  bool at_picture_ = false;                        // frame_ holds the one that Receive is to give
 };
 
 }  // namespace
@@ -196,6 +246,7 @@ Result<bool> FrameSource::NextOfAnySize(cv::Mat* picture, std::string* complaint
   decoded.picture = std::move(*picture);  // its memory is used again
   const Result<bool> more = Decode(&decoded);
   if (!more || !*more) return more;
+  ++next_;
   const CameraGuess& camera = recording_.camera;
   if (decoded.width_px == camera.width_px && decoded.height_px == camera.height_px) {
     *picture = std::move(decoded.picture);
@@ -205,6 +256,17 @@ Result<bool> FrameSource::NextOfAnySize(cv::Mat* picture, std::string* complaint
     picture->release();
   }
   return true;
+}
+
+Status FrameSource::SkipTo(size_t frame) {
+  cv::Mat passed;
+  std::string complaint;
+  while (next_ < frame) {
+    const Result<bool> more = NextOfAnySize(&passed, &complaint);
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) break;
+  }
+  return {};
 }
 
 Result<bool> FrameSource::Next(cv::Mat* picture) {

@@ -33,16 +33,22 @@ class FrameSource {
   // says which it was.
   Result<bool> NextOfAnySize(cv::Mat* picture, std::string* complaint);
 
+  // Passes over frames, so that the next one is `frame` of Recording::frames; nothing where that
+  // has gone by. Of a video, only what the frame needs is decoded, from the key picture before it.
+  // Errors as of Next.
+  virtual Status SkipTo(size_t frame);
+
  protected:
   struct Decoded {
     cv::Mat picture;
     int width_px = 0, height_px = 0;
     std::string place;  // "file: frame 3", for complaints
   };
-  // The next frame as it is stored; false at the end.
+  // Frame next_ as it is stored; false at the end.
   virtual Result<bool> Decode(Decoded* decoded) = 0;
 
   const Recording& recording_;
+  size_t next_ = 0;  // of recording_.frames
 };
 
 // Opens the images or the video of a recording. The recording must outlive the source.

@@ -261,7 +261,6 @@ class BagFrames : public FrameSource {
     decoded->width_px = image->cols;
     decoded->height_px = image->rows;
     decoded->picture = std::move(*image);
-    ++next_;
     return true;
   }
 
@@ -270,7 +269,6 @@ class BagFrames : public FrameSource {
   const std::unique_ptr<Bag> bag_;
   const BagTopic topic_;
   size_t pictures_ = 0;  // read
-  size_t next_ = 0;      // frame
 };
 
 }  // namespace

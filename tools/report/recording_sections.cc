@@ -106,29 +106,20 @@ Result<std::map<int, std::vector<unsigned char>>> Pictures(const Recording& reco
                                                            const std::vector<int>& frames) {
   std::map<int, std::vector<unsigned char>> pictures;
   if (!recording.HasImages() || frames.empty()) return pictures;
-  // Single images need not be read one after the other; a video does.
-  Recording shown;
-  shown.path = recording.path;
-  shown.camera = recording.camera;
-  shown.video_file = recording.video_file;
-  const bool video = !recording.video_file.empty();
-  for (const int frame : frames) {
-    if (!video) shown.frames.push_back(recording.frames[static_cast<size_t>(frame)]);
-  }
-  if (video) shown.frames = recording.frames;
-  Result<std::unique_ptr<FrameSource>> source = OpenFrames(shown);
+  Result<std::unique_ptr<FrameSource>> source = OpenFrames(recording);
   if (!source) return tl::unexpected(source.error());
-  size_t next = 0;
-  for (int i = 0; next < frames.size(); ++i) {
+  for (const int frame : frames) {
     cv::Mat gray;
+    if (Status there = (*source)->SkipTo(static_cast<size_t>(frame)); !there) {
+      return tl::unexpected(there.error());
+    }
     const Result<bool> read = (*source)->Next(&gray);
     if (!read) return tl::unexpected(read.error());
     if (!*read) break;
-    if (video && i != frames[next]) continue;
     const double scale = std::min(1.0, static_cast<double>(kMaxPictureWidth) / gray.cols);
     cv::Mat small;
     cv::resize(gray, small, cv::Size(), scale, scale, cv::INTER_AREA);
-    cv::imencode(".jpg", small, pictures[frames[next++]], {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+    cv::imencode(".jpg", small, pictures[frame], {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
   }
   return pictures;
 }

@@ -87,6 +87,36 @@ TEST(VideoReader, HandsOutEveryFrameWithTheContainersStamps) {
   EXPECT_FALSE(end.value());
 }
 
+TEST(VideoReader, SkipsToAFrame) {
+  const RecordingFolder folder;
+  WriteFolder(folder, Video(60));  // a key picture in every 12
+  Result<Recording> recording = ReadRecording(folder.path());
+  ASSERT_TRUE(recording) << recording.error().message;
+  LeaveOutFrames({5, 40}, /*repeats=*/false, &*recording);
+  auto frames = OpenFrames(*recording);
+  ASSERT_TRUE(frames) << frames.error().message;
+  const auto expect_next = [&](int picture) {
+    cv::Mat gray;
+    const Result<bool> read = (*frames)->Next(&gray);
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_TRUE(*read);
+    // Of neighbours it differs by 2 and where the block moves; of those further off by more.
+    EXPECT_LT(cv::norm(gray, Picture(picture), cv::NORM_L1) / (64.0 * 48.0), 1.5) << picture;
+  };
+  for (const auto& [frame, picture] : {std::pair(4, 4), {30, 31}, {32, 33}, {57, 59}}) {
+    ASSERT_TRUE((*frames)->SkipTo(static_cast<size_t>(frame)));
+    expect_next(picture);
+    if (frame == 30) {
+      ASSERT_TRUE((*frames)->SkipTo(7));  // has gone by
+      expect_next(32);
+    }
+  }
+  cv::Mat gray;
+  EXPECT_FALSE((*frames)->Next(&gray).value());
+  ASSERT_TRUE((*frames)->SkipTo(100));  // beyond the end
+  EXPECT_FALSE((*frames)->Next(&gray).value());
+}
+
 TEST(VideoReader, TakesStampsFromTheTable) {
   const RecordingFolder folder;
   WriteFolder(folder, Video(3));
