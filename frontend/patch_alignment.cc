@@ -71,35 +71,42 @@ bool Inside(const cv::Mat& image, const Eigen::Vector2f& px, float reach) {
          px.y() + reach + 1.0F <= static_cast<float>(image.rows - 1);
 }
 
+// Two neighbouring grey values, the left one in the low byte: compilers make one load of it.
+int NeighboursAt(const uchar* left) { return left[0] | left[1] << 8; }
+
 // Grey values, bilinear, at px, px + step, ...; these and their right and lower neighbours are
-// inside.
+// inside. Beyond `count`, anything.
 Row SampleRow(const cv::Mat& image, const Eigen::Vector2f& px, const Eigen::Vector2f& step,
               int count) {
-  const auto stride = static_cast<ptrdiff_t>(image.step);
+  const auto stride = static_cast<int>(image.step);
   using Whole = Eigen::Array<int, kPitch, 1>;
-  Whole us, vs;
+  Whole offset;
   Row a, b;
   for (int x = 0; x < kPitch; ++x) {
     const float fu = px.x() + static_cast<float>(x) * step.x();
     const float fv = px.y() + static_cast<float>(x) * step.y();
-    us[x] = static_cast<int>(fu);
-    vs[x] = static_cast<int>(fv);
-    a[x] = fu - static_cast<float>(us[x]);
-    b[x] = fv - static_cast<float>(vs[x]);
+    const int u = static_cast<int>(fu), v = static_cast<int>(fv);
+    a[x] = fu - static_cast<float>(u);
+    b[x] = fv - static_cast<float>(v);
+    offset[x] = v * stride + u;
   }
-  Whole upper_left = Whole::Zero(), upper_right = Whole::Zero();
-  Whole lower_left = Whole::Zero(), lower_right = Whole::Zero();
-  for (int x = 0; x < count; ++x) {
-    const uchar* upper = image.data + vs[x] * stride + us[x];
-    const uchar* lower = upper + stride;
-    upper_left[x] = upper[0];
-    upper_right[x] = upper[1];
-    lower_left[x] = lower[0];
-    lower_right[x] = lower[1];
+  for (int x = count; x < kPitch; ++x) offset[x] = offset[0];
+  Whole upper, lower;
+  for (int x = 0; x < kPitch; ++x) {
+    const uchar* first = image.data + offset[x];
+    upper[x] = NeighboursAt(first);
+    lower[x] = NeighboursAt(first + stride);
   }
-  const Row above = upper_left.cast<float>() + a * (upper_right - upper_left).cast<float>();
-  const Row below = lower_left.cast<float>() + a * (lower_right - lower_left).cast<float>();
-  return above + b * (below - above);
+  Row row;
+  for (int x = 0; x < kPitch; ++x) {
+    const int upper_left = upper[x] & 0xFF, lower_left = lower[x] & 0xFF;
+    const float above =
+        static_cast<float>(upper_left) + a[x] * static_cast<float>((upper[x] >> 8) - upper_left);
+    const float below =
+        static_cast<float>(lower_left) + a[x] * static_cast<float>((lower[x] >> 8) - lower_left);
+    row[x] = above + b[x] * (below - above);
+  }
+  return row;
 }
 
 // The patch of the first picture: grey values, derivatives, weights, normal equations.
