@@ -1,5 +1,7 @@
 #include "simulation/gyro.h"
 
+#include <glog/logging.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -28,6 +30,7 @@ class Element {
   // Times must not decrease.
   Vector3d At(double time_s) {
     if (time_constant_s_ <= 0.0) return Rate(time_s);
+    CHECK_GE(time_s, time_s_);
     // y' = (w - y) / T over steps of at most 0.5 ms: exact decay, Simpson's rule for the input.
     const int steps = static_cast<int>(std::ceil((time_s - time_s_) / 5e-4));
     const double h = steps > 0 ? (time_s - time_s_) / steps : 0.0;
@@ -170,9 +173,9 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
     Vector3d rate = Vector3d::Zero();
     if (options.averaged) {  // Gauss-Legendre, 3 points over the interval about the stamp
       const double offset = 0.5 * dt * std::sqrt(0.6);
-      rate = (5.0 * element.At(time_s - offset) + 8.0 * element.At(time_s) +
-              5.0 * element.At(time_s + offset)) /
-             18.0;
+      rate = 5.0 / 18.0 * element.At(time_s - offset);  // one after the other: as time goes
+      rate += 8.0 / 18.0 * element.At(time_s);
+      rate += 5.0 / 18.0 * element.At(time_s + offset);
     } else {
       rate = element.At(time_s);
     }

@@ -54,9 +54,9 @@ def read(path):
         return yaml.safe_load(file)
 
 
-def arrivals_s(latency_s, stall_s, count, random):
+def arrivals_s(latency_s, stall_s, rate_hz, count, random):
     """Latencies of samples that arrive in order, as simulation/gyro.cc draws them."""
-    times = np.arange(count) / GYRO_HZ
+    times = np.arange(count) / rate_hz
     late = latency_s * random.exponential(size=count)
     late += stall_s * random.uniform(size=count) * (random.uniform(size=count) * STALL_EVERY < 1)
     return np.maximum.accumulate(times + late) - times
@@ -67,7 +67,7 @@ def usual_median_s(size):
     latency_s, stall_s = 1e-3 * size[1], 1e-3 * size[2]
     if not latency_s:
         return 0.0
-    return float(np.median(arrivals_s(latency_s, stall_s, 2000000, np.random.default_rng(1))))
+    return float(np.median(arrivals_s(latency_s, stall_s, GYRO_HZ, 2000000, np.random.default_rng(1))))
 
 
 def latencies_of(recording):

@@ -3,15 +3,18 @@
 class usually show and declared by nobody, and prints how the errors compare with sigma_total:
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
-                            [--motions NAME,...] [--clean] [--diagnose] [--jobs N] [--camgyro PATH]
-                            [KEY=VALUE ...]
+                            [--motions NAME,...] [--clean] [--strange] [--diagnose] [--jobs N]
+                            [--camgyro PATH] [KEY=VALUE ...]
 
 The sizes are those of the class in estimator/diagnosis/device_class.cc, read from that file. --clean
-draws nothing: for how often a doubt is said of a device that has no effect. --diagnose: what
+draws nothing: for how often a doubt is said of a device that has no effect. --strange also draws how
+each was recorded: motion, length, rates, size of the picture, mounting, stamps of arrival, samples and
+frames that are missing, wrong, few and short-lived tracks, and things that move. --diagnose: what
 `diagnose` makes of the devices, instead of `calibrate`. KEY=VALUE changes the scenario of all
 recordings, as in `camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the
 errors within 3 sigma_total, their rms in sigma_total, the median of sigma_total [px, s, rad/s, rad]
-and what that is of the spread of the errors, the recordings with errors beyond 3 sigma_total, and
+and what that is of the spread of the errors, the recordings with errors beyond 3 sigma_total (or,
+with --clean, beyond 4 sigmas of noise), and
 the NEES per parameter with the total covariance.
 """
 import argparse
@@ -25,6 +28,7 @@ import numpy as np
 import yaml
 
 from calibration_errors import NAMES, errors
+from measure_stamps import MOTIONS, arrivals_s
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CLASSES = ("phone", "action", "industrial")
@@ -72,12 +76,81 @@ def drawn_effects(device, seed):
     return {"camera": camera, "effects": effects}
 
 
+def drawn_conditions(seed, scenario):
+    """Changes a scenario to one that a stranger may have recorded."""
+    random = np.random.default_rng([seed, 1])
+
+    def often(probability):
+        return random.uniform() < probability
+
+    def log_uniform(low, high):
+        return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+    scenario["duration_s"] = log_uniform(8, 40)
+    scenario["motion"] = {"kind": str(random.choice(MOTIONS))}
+    camera = scenario.setdefault("camera", {})
+    width, height = [(640, 480), (1280, 720), (1920, 1080), (720, 480)][random.integers(4)]
+    camera["resolution"] = [width, height]
+    # From 50 to 85 degrees across.
+    camera["focal_px"] = float(0.5 * width / np.tan(np.radians(random.uniform(25, 42.5))))
+    camera["rate_hz"] = float(random.choice([15, 20, 24, 30, 30, 60]))
+    camera["readout_s"] = float(random.uniform(0.2, 0.95) * min(0.033, 1 / camera["rate_hz"])
+                                * (-1 if often(0.2) else 1))
+    camera["exposure_s"] = min(camera.get("exposure_s", 0.005), 0.5 / camera["rate_hz"])
+    camera["delay_s"] = float(random.uniform(-0.3, 0.3))
+    camera["drop_fraction"] = log_uniform(0.005, 0.1) if often(0.3) else 0.0
+    # One of the turns that put axes on axes, and some degrees.
+    axes = random.integers(-1, 2, 4).astype(float)
+    while axes @ axes not in (1, 2, 4):
+        axes = random.integers(-1, 2, 4).astype(float)
+    wxyz = axes / np.linalg.norm(axes) + random.normal(0, 0.02, 4)
+    scenario["mount"] = {"q_gyro_cam_wxyz": (wxyz / np.linalg.norm(wxyz)).tolist()}
+    gyro = scenario["gyro"] = {
+        "rate_hz": float(random.choice([50, 100, 200, 200, 400])),
+        "bias_rad_s": random.normal(0, 0.02, 3).tolist(),
+        "quantum_rad_s": float(random.choice([0.0, 0.0, 0.001])),
+        "averaged": bool(often(0.5)),
+        "noise_density_rad_s_rtHz": log_uniform(5e-5, 1e-3)}
+    stamps = random.integers(3)
+    if stamps == 1:
+        gyro["drop_fraction"] = log_uniform(0.001, 0.05)
+    elif stamps == 2:
+        gyro["stamp_latency_s"] = log_uniform(0.0005, 0.01)
+    effects = scenario.setdefault("effects", {})
+    if often(0.4):
+        effects["frame_stamp_jitter"] = {"latency_s": log_uniform(0.0005, 0.005)}
+    scenario["tracks"] = {
+        "noise_px": log_uniform(0.1, 0.8), "noise_scatter": float(random.choice([0.0, 0.3])),
+        "count": int(log_uniform(40, 200)), "reanchored": bool(often(0.5)),
+        "outlier_fraction": log_uniform(0.005, 0.1),
+        "mean_life_frames": float(random.choice([0, 12, 40]))}
+    scenario["scene"] = {"kind": "points"}
+    if often(0.3):
+        scenario["scene"]["moving_fraction"] = float(random.uniform(0.03, 0.2))
+    return "%s, %.0f s at %g and %g Hz" % (
+        scenario["motion"]["kind"], scenario["duration_s"], camera["rate_hz"], gyro["rate_hz"])
+
+
+def latency_s(scenario):
+    """What stamps of arrival make of the delay: a gyro whose median stamp is on time, and a camera
+    whose mean stamp is, have none (docs/recording_format.md)."""
+    gyro = scenario.get("gyro", {})
+    median_s = 0.0
+    if "stamp_latency_s" in gyro:
+        median_s = float(np.median(arrivals_s(gyro["stamp_latency_s"], 0.0, gyro["rate_hz"], 200000,
+                                              np.random.default_rng(1))))
+    jitter = scenario.get("effects", {}).get("frame_stamp_jitter", {})
+    return median_s - jitter.get("latency_s", 0.0)
+
+
 def run(options, seed):
     motion = options.motions[seed % len(options.motions)]
     scenario = {"seed": seed, "duration_s": options.duration, "motion": {"kind": motion},
                 "tracks": {"noise_px": 0.5, "outlier_fraction": 0.02}}
     if not options.clean:
         scenario.update(drawn_effects(options.device, seed))
+    if options.strange:
+        motion = drawn_conditions(seed, scenario)
     with tempfile.TemporaryDirectory() as folder:
         recording, out = folder + "/recording", folder + "/out"
         with open(folder + "/scenario.yaml", "w", encoding="utf-8") as file:
@@ -98,7 +171,8 @@ def run(options, seed):
         doubts = ["the pictures show something" in done.stdout,
                   "the two halves of the recording disagree" in done.stdout]
         if not options.clean:
-            as_fitted(truth, recording, options.duration)
+            as_fitted(truth, recording, scenario["duration_s"])
+        truth["clock"]["delay_s"]["value"] += latency_s(scenario)
         error, noise = errors(calibration, truth)
         total = np.array(calibration["covariance"]["total"])
         determined = np.array([name not in calibration["quality"]["unobservable"]
@@ -121,6 +195,12 @@ def as_fitted(truth, recording, duration_s):
         for axis, b, f in zip("xyz", bias["value"], force)]
 
 
+def beyond(name, errors_in_sigmas, limit, sigma):
+    if np.nanmax(np.abs(errors_in_sigmas)) > limit:
+        print("beyond %d %s in %s:" % (limit, sigma, name), ", ".join(
+            "%s %.1f" % pair for pair in zip(NAMES, errors_in_sigmas) if abs(pair[1]) > limit))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -129,6 +209,7 @@ def main():
     parser.add_argument("--duration", type=float, default=20.0)
     parser.add_argument("--motions", default="walking,running,handheld")
     parser.add_argument("--clean", action="store_true")
+    parser.add_argument("--strange", action="store_true")
     parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
@@ -145,9 +226,10 @@ def main():
     noise = np.array([r["noise"] for r in results])
     used = np.array([r["determined"] for r in results])
     z = np.where(used, error / sigma, np.nan)
-    print("%d of %d devices of class %s%s calibrated; a doubt of the model in %d, of the halves in %d"
-          % (len(results), len(seeds), options.device, ", clean" if options.clean else "",
-             *np.sum([r["doubts"] for r in results], axis=0)))
+    print("%d of %d devices of class %s%s%s calibrated; a doubt of the model in %d, of the halves in "
+          "%d" % (len(results), len(seeds), options.device, ", clean" if options.clean else "",
+                  ", strangely recorded" if options.strange else "",
+                  *np.sum([r["doubts"] for r in results], axis=0)))
     print("| parameter | determined | within 3 sigma_total | rms error in sigma_total | "
           "sigma_total | sigma_total / spread of errors | rms error in sigma of noise |")
     print("| --- " * 7 + "|")
@@ -164,9 +246,10 @@ def main():
         used.sum(), 100 * np.mean(np.abs(z[used]) < 3), np.sqrt(np.mean(z[used]**2)),
         np.sqrt(np.mean((error[used] / noise[used])**2))))
     for r, errors_in_sigmas in zip(results, z):
-        if np.any(np.abs(errors_in_sigmas) > 3):
-            print("beyond 3 sigma_total in %s:" % r["name"], ", ".join(
-                "%s %.1f" % pair for pair in zip(NAMES, errors_in_sigmas) if abs(pair[1]) > 3))
+        beyond(r["name"], errors_in_sigmas, 3, "sigma_total")
+        if options.clean:  # has none of what the total allows for
+            beyond(r["name"], np.where(r["determined"], r["error"] / r["noise"], 0), 4,
+                   "sigma of noise")
     nees = [r["error"] @ np.linalg.solve(r["total"], r["error"]) / len(NAMES) for r in results]
     print("NEES per parameter with the total covariance: mean %.2f, median %.2f" % (
         np.mean(nees), np.median(nees)))

@@ -252,11 +252,25 @@ class FocalScan {
   }
 
   // The alignment anew, from rotations at the best focal length that are made with the last one.
+  //
+  // These are near the gyro's, and so follow a bias that is wrong: of a camera that steps sideways
+  // all the time, past walls of one distance, the step may have been taken for a turn. Most gyros
+  // have little bias, and where the matches of two pictures fit each other better with none, the
+  // rotations are made with none.
   void Improve() {
+    std::vector<RotationTrial> trials(2, {best_focal_px_, rough_});
+    trials[1].rough->bias_gyro_rad_s.setZero();
+    std::vector<ScanPoint> points(2);
+    std::vector<std::vector<CameraRotation>> rotations = rotations_at_(recording_, trials);
+    for (size_t k = 0; k < points.size(); ++k) {
+      points[k].x = static_cast<double>(k);
+      points[k].rotations = std::move(rotations[k]);
+      MeasureMatches(recording_, &points[k]);
+    }
+    const ScanCurve curve(std::move(points), /*spacing=*/1.0, kLeastMatches);
     StartOptions loose = options_;
     loose.max_rate_ratio = kLooseRateRatio;
-    Result<StartResult> better =
-        FindStart(recording_, rotations_at_(recording_, {{best_focal_px_, rough_}}).front(), loose);
+    Result<StartResult> better = FindStart(recording_, curve.Best().rotations, loose);
     if (!better) return;
     near_ = std::move(*better);
     rough_ = RoughlyAligned(near_, rough_.readout_s);

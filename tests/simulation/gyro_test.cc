@@ -116,6 +116,20 @@ TEST(Gyro, AveragingAttenuatesWithoutDelay) {
   }
 }
 
+TEST(Gyro, AveragesWhatTheLowPassLeaves) {
+  Scenario scenario = Quiet();
+  scenario.gyro.averaged = true;
+  scenario.gyro.rate_hz = 100.0;
+  scenario.effects.gyro_lowpass.time_constant_s = 0.004;
+  const double w = 2.0 * M_PI * 5.0, x = 0.5 * w * 0.01;
+  const double gain = std::sin(x) / x / std::sqrt(1.0 + w * w * 0.004 * 0.004);
+  const double lag = std::atan(w * 0.004);
+  for (const GyroSample& sample : SampleGyro(scenario, Tone(1.0, 5.0)).gyro) {
+    const double t = TimeOf(scenario, sample);
+    EXPECT_NEAR(sample.omega_gyro_rad_s.y(), gain * std::sin(w * t - lag), 1e-6);
+  }
+}
+
 TEST(Gyro, ScaleMisalignmentClippingAndQuantisation) {
   Scenario scenario = Quiet();
   scenario.effects.gyro_scale.error = {0.1, 0.02, 0.3};
