@@ -196,7 +196,7 @@ def as_fitted(truth, recording, duration_s):
 
 
 def beyond(name, errors_in_sigmas, limit, sigma):
-    if np.nanmax(np.abs(errors_in_sigmas)) > limit:
+    if np.any(np.abs(errors_in_sigmas) > limit):
         print("beyond %d %s in %s:" % (limit, sigma, name), ", ".join(
             "%s %.1f" % pair for pair in zip(NAMES, errors_in_sigmas) if abs(pair[1]) > limit))
 
@@ -248,7 +248,7 @@ def main():
     for r, errors_in_sigmas in zip(results, z):
         beyond(r["name"], errors_in_sigmas, 3, "sigma_total")
         if options.clean:  # has none of what the total allows for
-            beyond(r["name"], np.where(r["determined"], r["error"] / r["noise"], 0), 4,
+            beyond(r["name"], np.where(r["determined"], r["error"] / r["noise"], 0.0), 4,
                    "sigma of noise")
     nees = [r["error"] @ np.linalg.solve(r["total"], r["error"]) / len(NAMES) for r in results]
     print("NEES per parameter with the total covariance: mean %.2f, median %.2f" % (

@@ -106,6 +106,37 @@ TEST(FindStartAndFocal, FindsTheReadoutTime) {
   }
 }
 
+// Of a camera that steps sideways all the time, past points of one distance, rotations may take the
+// step for a turn. What the gyro lacks of it then is its bias; and rotations that are made near the
+// gyro's with that bias are as wrong, at matches that fit each other worse.
+TEST(FindStartAndFocal, StepsTakenForATurnAreNoBias) {
+  SimulatedTruth truth = CoarseTruth();
+  truth.bias_gyro_rad_s = {0.01, -0.02, 0.015};
+  const Eigen::Vector3d with_step = truth.bias_gyro_rad_s + Eigen::Vector3d(0.0, 0.25, 0.0);
+  const Simulated s = MakeScene(SmoothRandomRate(70, 0.8), 0, truth);
+  const CameraRotationsAt plain = SeenAt(s);
+  const auto stepping = [&](const Recording& recording, const std::vector<RotationTrial>& trials) {
+    auto seen = plain(recording, trials);
+    for (size_t k = 0; k < seen.size(); ++k) {
+      const Eigen::Vector3d bias = trials[k].rough ? trials[k].rough->bias_gyro_rad_s : with_step;
+      const Eigen::Vector3d wrong = truth.bias_gyro_rad_s - bias;
+      const bool astray = wrong.norm() > 0.1;  // else near enough for the right minimum
+      for (CameraRotation& rotation : seen[k]) {
+        rotation.residual_px = astray ? 1.0 : 0.3;
+        if (!astray) continue;
+        const Eigen::Vector3d turn = truth.q_gyro_cam.conjugate() * wrong / truth.fps;
+        rotation.q_a_b = rotation.q_a_b * Exp(turn);
+      }
+    }
+    return seen;
+  };
+  const auto start = FindStartAndFocal(s.recording, stepping, {}, {});
+  ASSERT_TRUE(start) << start.error().message;
+  EXPECT_LT((start->bias_gyro_rad_s - truth.bias_gyro_rad_s).norm(), 0.01)
+      << start->bias_gyro_rad_s.transpose();
+  EXPECT_NEAR(start->focal->value_px, kTrueFocalPx, 0.03 * kTrueFocalPx);
+}
+
 TEST(FindStartAndFocal, AGuessThatIsFarOffDoesNotMatter) {
   Simulated s = MakeScene(SmoothRandomRate(70, 0.8), 0);
   s.recording.camera.focal_px = 0.5 * kTrueFocalPx;
