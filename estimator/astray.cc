@@ -24,6 +24,7 @@ constexpr double kSeenSigmas = 3.0;
 
 // Written so that what is no number has run away, and is far.
 bool RanAway(double focal_px, double from_px) {
+  if (from_px == 0.0) return false;  // of attitudes, which have no lens
   return !(std::abs(std::log(focal_px / from_px)) <= std::log(kRunAwayFocal));
 }
 

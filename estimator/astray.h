@@ -15,7 +15,8 @@
 
 namespace camgyro {
 
-// A focal length has run away from where it was: they differ by more than a factor of 2.
+// A focal length has run away from where it was: they differ by more than a factor of 2. Attitudes
+// have none, which is 0 and stays.
 bool RanAway(double focal_px, double from_px);
 
 // A focal length is far from that of the rotations at the start, if they determine one: a strong

@@ -28,6 +28,7 @@ TEST(Astray, AFocalLengthRunsAwayByAFactorOfTwo) {
   EXPECT_TRUE(RanAway(240.0, 500.0));
   EXPECT_TRUE(RanAway(-500.0, 500.0));
   EXPECT_TRUE(RanAway(std::numeric_limits<double>::quiet_NaN(), 500.0));
+  EXPECT_FALSE(RanAway(0.0, 0.0));  // of attitudes
 }
 
 TEST(Astray, AFocalLengthIsFarFromThatOfTheRotations) {

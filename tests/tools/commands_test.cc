@@ -292,6 +292,22 @@ TEST_F(CommandsTest, DiagnoseMeasuredAttitudesWithoutAName) {
   }
 }
 
+// Measured: a tablet whose gyro is filtered, and whose attitudes see each axis at another time.
+// Attitudes have no focal length that could run away.
+TEST_F(CommandsTest, DiagnoseMeasuredAttitudes) {
+  const auto recording = MeasuredData("tablet-attitude/D12");
+  if (!recording) GTEST_SKIP() << "*** SKIPPED: no measured recording tablet-attitude/D12";
+  const RunResult run = Run("diagnose " + *recording + " --out=result");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const YAML::Node diagnosis = YAML::LoadFile(Path("result/diagnosis.yaml"));
+  EXPECT_THAT(diagnosis["verdict"]["effects"].as<std::vector<std::string>>(),
+              testing::ElementsAre("gyro_lowpass", "gyro_axis_delay"));
+  const auto rms = [&](size_t round, const char* when) {
+    return diagnosis["rounds"][round]["unseen_rms_px"][when].as<double>();
+  };
+  EXPECT_LT(rms(1, "after"), 0.8 * rms(0, "before"));
+}
+
 // Measured: the online window runs away to a lens without rays for some pixels; the fit of all
 // frames begins at the start again.
 TEST_F(CommandsTest, CalibrateMeasuredLensFromTheStart) {
