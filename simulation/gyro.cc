@@ -1,7 +1,5 @@
 #include "simulation/gyro.h"
 
-#include <glog/logging.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -30,7 +28,6 @@ class Element {
   // Times must not decrease.
   Vector3d At(double time_s) {
     if (time_constant_s_ <= 0.0) return Rate(time_s);
-    CHECK_GE(time_s, time_s_);
     // y' = (w - y) / T over steps of at most 0.5 ms: exact decay, Simpson's rule for the input.
     const int steps = static_cast<int>(std::ceil((time_s - time_s_) / 5e-4));
     const double h = steps > 0 ? (time_s - time_s_) / steps : 0.0;
