@@ -1,7 +1,9 @@
 #include "estimator/diagnosis/pair_scores.h"
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "core/parallel.h"
@@ -11,41 +13,126 @@
 namespace camgyro {
 namespace {
 
-void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore* block) {
-  Eigen::MatrixXd A = s.N.transpose() * s.N;
-  A.diagonal() += s.prior;
+// A pair's equations with what is its own projected out, but for the frames' own times, which it
+// shares with the pairs before and after it: these are its rows of `frames`.
+struct PairAlone {
+  std::array<int, 2> frames = {0, 0};
+  double frame_time_prior = 0.0;  // 1 / s^2
+  Eigen::Vector2d at;             // where the times are [s]
+  double chi2 = 0.0;
+  Eigen::VectorXd g;
+  Eigen::MatrixXd H;
+  // By the two times: their own score and information, and those that they share with all columns.
+  // No rows where the model has no times.
+  Eigen::VectorXd times_g;
+  Eigen::MatrixXd times_H, times_by_columns;
+};
+
+PairAlone ProjectOwnOut(const PairSystem& s, const TimedPair& pair) {
+  const bool with_times = s.times_column >= 0;
+  const Eigen::Index first = with_times ? s.times_column : s.N.cols();
+  const Eigen::Index last = s.N.cols() - first - (with_times ? 2 : 0);
+  PairAlone p;
+  Eigen::MatrixXd N(s.N.rows(), first + last);
+  N << s.N.leftCols(first), s.N.rightCols(last);
+  Eigen::VectorXd prior(first + last), at(first + last);
+  prior << s.prior.head(first), s.prior.tail(last);
+  at << s.at.head(first), s.at.tail(last);
+  Eigen::MatrixXd A = N.transpose() * N;
+  A.diagonal() += prior;
   A.diagonal().array() += 1e-9;
   const Eigen::LDLT<Eigen::MatrixXd> solver(A);
-  const Eigen::MatrixXd NJ = s.N.transpose() * s.J;
-  const Eigen::VectorXd Nr = s.N.transpose() * s.r + s.prior.cwiseProduct(s.at);
+  const Eigen::MatrixXd NJ = N.transpose() * s.J;
+  const Eigen::VectorXd Nr = N.transpose() * s.r + prior.cwiseProduct(at);
   const Eigen::MatrixXd X = solver.solve(NJ);
   const Eigen::VectorXd x = solver.solve(Nr);
-  const Eigen::VectorXd g = s.J.transpose() * s.r - NJ.transpose() * x;
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(s.J.cols(), s.J.cols());
-  H.selfadjointView<Eigen::Lower>().rankUpdate(s.J.transpose());
-  H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
-  H.noalias() -= NJ.transpose() * X;
-  pair->chi2 = s.r.squaredNorm() + s.at.dot(s.prior.cwiseProduct(s.at)) - Nr.dot(x);
-  if (s.times_column >= 0) {
-    // log det(1 + s^2 W), W the information of the times with all else of the pair projected out:
-    // they have a covariance of (W + s^-2)^-1.
-    const Eigen::MatrixXd unit =
-        Eigen::MatrixXd::Identity(s.N.cols(), s.N.cols()).middleCols<2>(s.times_column);
-    const Eigen::Matrix2d covariance = solver.solve(unit).middleRows<2>(s.times_column);
-    pair->log_det = -std::log(covariance.determinant() * s.prior.segment<2>(s.times_column).prod());
+  p.g = s.J.transpose() * s.r - NJ.transpose() * x;
+  p.H = Eigen::MatrixXd::Zero(s.J.cols(), s.J.cols());
+  p.H.selfadjointView<Eigen::Lower>().rankUpdate(s.J.transpose());
+  p.H.triangularView<Eigen::StrictlyUpper>() = p.H.transpose();
+  p.H.noalias() -= NJ.transpose() * X;
+  p.chi2 = s.r.squaredNorm() + at.dot(prior.cwiseProduct(at)) - Nr.dot(x);
+  if (with_times) {
+    const auto T = s.N.middleCols<2>(first);
+    const Eigen::MatrixXd NT = N.transpose() * T;
+    p.frames = {pair.frame_a, pair.frame_b};
+    p.frame_time_prior = s.prior[first];
+    p.at = s.at.segment<2>(first);
+    p.times_g = T.transpose() * s.r - NT.transpose() * x;
+    p.times_H = T.transpose() * T - NT.transpose() * solver.solve(NT);
+    p.times_by_columns = T.transpose() * s.J - NT.transpose() * X;
   }
-  pair->g = g;
-  pair->H = H.topLeftCorner(num_model, num_model);
-  block->g += g;
-  block->H += H;
-  block->chi2 += pair->chi2;
-  block->log_det += pair->log_det;
-  block->residuals += pair->residuals;
-  ++block->pairs;
-  if (s.bend_column < 0) return;
+  return p;
+}
 
-  // Likelihood of two widths of the bend, all else of the pair projected out: with u the bend's
-  // score and W its information, 2 log L(s) = u (W + s^-2)^-1 u - log det(1 + s^2 W).
+// Sums the pairs of a block, with the frames' own times projected out of all of them together.
+// (Of each pair by itself, a frame would have a time in each of its pairs: whether the focal length
+// or the time between two frames is longer than was thought would be as open as one interval lets
+// it, and the shift of a focal length by a lens had the wrong sign.)
+void SumUp(const std::vector<PairAlone>& projected, int num_model, std::vector<PairScore>* pairs,
+           BlockScore* block) {
+  std::map<int, Eigen::Index> rows;  // of each frame that has a time
+  std::map<int, double> uses;
+  for (const PairAlone& p : projected) {
+    if (p.times_g.size() == 0) continue;
+    for (const int frame : p.frames) {
+      rows.emplace(frame, static_cast<Eigen::Index>(rows.size()));
+      ++uses[frame];
+    }
+  }
+  const auto frames = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(frames, frames);
+  Eigen::MatrixXd by_columns = Eigen::MatrixXd::Zero(frames, block->g.size());
+  Eigen::VectorXd b = Eigen::VectorXd::Zero(frames);
+  double log_prior = 0.0;
+  for (const PairAlone& p : projected) {
+    for (Eigen::Index i = 0; i < p.times_g.size(); ++i) {
+      const int frame = p.frames.at(static_cast<size_t>(i));
+      const Eigen::Index row = rows[frame];
+      const double part = 1.0 / uses[frame];  // of the prior, which each frame has once
+      b[row] += p.times_g[i] + part * p.frame_time_prior * p.at[i];
+      D(row, row) += part * p.frame_time_prior;
+      log_prior += part * std::log(p.frame_time_prior);
+      by_columns.row(row) += p.times_by_columns.row(i);
+      for (Eigen::Index j = 0; j < 2; ++j) {
+        D(row, rows[p.frames.at(static_cast<size_t>(j))]) += p.times_H(i, j);
+      }
+    }
+  }
+  const Eigen::LDLT<Eigen::MatrixXd> solver(D);
+  const Eigen::MatrixXd Y = solver.solve(by_columns);
+  const Eigen::VectorXd y = solver.solve(b);
+  if (frames > 0) block->log_det = solver.vectorD().array().log().sum() - log_prior;
+  for (size_t k = 0; k < projected.size(); ++k) {
+    const PairAlone& p = projected[k];
+    PairScore& pair = (*pairs)[k];
+    Eigen::MatrixXd H = p.H;
+    pair.g = p.g;
+    pair.chi2 = p.chi2;
+    pair.log_det = frames > 0 ? block->log_det / static_cast<double>(projected.size()) : 0.0;
+    for (Eigen::Index i = 0; i < p.times_g.size(); ++i) {
+      const int frame = p.frames.at(static_cast<size_t>(i));
+      const Eigen::Index row = rows[frame];
+      const double pull = p.frame_time_prior * p.at[i] / uses[frame];
+      pair.g -= p.times_by_columns.row(i).transpose() * y[row];
+      pair.chi2 += pull * p.at[i] - (p.times_g[i] + pull) * y[row];
+      // Half of it and half of its transpose: the sum over the block is symmetric anyway.
+      const Eigen::MatrixXd half = 0.5 * p.times_by_columns.row(i).transpose() * Y.row(row);
+      H -= half + half.transpose();
+    }
+    block->g += pair.g;
+    block->H += H;
+    block->chi2 += pair.chi2;
+    block->residuals += pair.residuals;
+    ++block->pairs;
+    pair.H = H.topLeftCorner(num_model, num_model);
+  }
+}
+
+// Likelihood of two widths of the bend, all else of the pair projected out: with u the bend's score
+// and W its information, 2 log L(s) = u (W + s^-2)^-1 u - log det(1 + s^2 W).
+double GainOfFreeBend(const PairSystem& s) {
+  if (s.bend_column < 0) return 0.0;
   const Eigen::Index at = s.bend_column, n = s.N.cols();
   Eigen::VectorXd wide = s.prior;
   wide.segment<6>(at) = s.free_bend;
@@ -60,7 +147,7 @@ void ProjectInto(const PairSystem& s, int num_model, PairScore* pair, BlockScore
     return b.dot(factor.solve(b)) - s.at.dot(prior.cwiseProduct(s.at)) - log_det +
            prior.segment<6>(at).array().log().sum();
   };
-  pair->latent_gain = two_log(wide) - two_log(s.prior);
+  return two_log(wide) - two_log(s.prior);
 }
 
 }  // namespace
@@ -80,6 +167,7 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
     sum.g.setZero(size);
     sum.H.setZero(size, size);
     if (!block.empty()) sum.time_s = 0.5 * (block.front().time_a_s + block.back().time_b_s);
+    std::vector<PairAlone> projected;
     for (const TimedPair& pair : block) {
       PairSystem system;
       if (!MakePairSystem(input, pair, calibration, all, noise, options, &system)) continue;
@@ -89,9 +177,11 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
       // The direction takes two; the bend none, since chi2 has the penalty of its prior.
       score.residuals = static_cast<int>(system.r.size()) -
                         (ResidualOf(pair, options).facts().has_direction ? 2 : 0);
-      ProjectInto(system, scores.num_model, &score, &sum);
+      score.latent_gain = GainOfFreeBend(system);
+      projected.push_back(ProjectOwnOut(system, pair));
       pairs[b].push_back(std::move(score));
     }
+    SumUp(projected, scores.num_model, &pairs[b], &sum);
   });
   for (size_t b = 0; b < blocks.size(); ++b) {
     if (sums[b].pairs == 0) continue;
