@@ -255,8 +255,8 @@ class FocalScan {
   //
   // These are near the gyro's, and so follow a bias that is wrong: of a camera that steps sideways
   // all the time, past walls of one distance, the step may have been taken for a turn. Most gyros
-  // have little bias, and where the matches of two pictures fit each other better with none, the
-  // rotations are made with none.
+  // have little bias, and where the matches of two pictures fit each other distinctly better with
+  // none, the rotations are made with none.
   void Improve() {
     std::vector<RotationTrial> trials(2, {best_focal_px_, rough_});
     trials[1].rough->bias_gyro_rad_s.setZero();
@@ -268,9 +268,11 @@ class FocalScan {
       MeasureMatches(recording_, &points[k]);
     }
     const ScanCurve curve(std::move(points), /*spacing=*/1.0, kLeastMatches);
+    const bool distinct = curve.RunnerUpRatio(/*distance=*/0.5) < kMaxRunnerUp;
     StartOptions loose = options_;
     loose.max_rate_ratio = kLooseRateRatio;
-    Result<StartResult> better = FindStart(recording_, curve.Best().rotations, loose);
+    Result<StartResult> better =
+        FindStart(recording_, (distinct ? curve.Best() : curve.points().front()).rotations, loose);
     if (!better) return;
     near_ = std::move(*better);
     rough_ = RoughlyAligned(near_, rough_.readout_s);
