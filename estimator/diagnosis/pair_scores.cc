@@ -65,10 +65,9 @@ PairAlone ProjectOwnOut(const PairSystem& s, const TimedPair& pair) {
   return p;
 }
 
-// Sums the pairs of a block, with the frames' own times projected out of all of them together.
-// (Of each pair by itself, a frame would have a time in each of its pairs: whether the focal length
-// or the time between two frames is longer than was thought would be as open as one interval lets
-// it, and the shift of a focal length by a lens had the wrong sign.)
+// Sums the pairs of a block, with the frames' own times projected out of all of them together: of
+// each pair by itself, every interval between frames would be as open as one frame's time is
+// (docs/lab/random_devices.md).
 void SumUp(const std::vector<PairAlone>& projected, int num_model, std::vector<PairScore>* pairs,
            BlockScore* block) {
   std::map<int, Eigen::Index> rows;  // of each frame that has a time

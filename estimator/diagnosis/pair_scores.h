@@ -1,6 +1,7 @@
 // Scores: the derivative of the fit's cost by every parameter that is, or could be, in the model,
-// with what belongs to one pair of frames alone (direction, its turn, the noise of the gyro, the
-// frames' own times where the model has them) projected out.
+// with what belongs to one pair of frames alone (direction, its turn, the noise of the gyro)
+// projected out, and, where the model has them, the frames' own times, which pairs of a block
+// share.
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SCORES_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_PAIR_SCORES_H_
 
@@ -31,7 +32,8 @@ struct BlockScore {
   Eigen::MatrixXd H;
 };
 
-// One pair. g has all columns, H only those of state and effects in the model.
+// One pair's part of its block, which is their sum. g has all columns, H only those of state and
+// effects in the model. Where frames have times of their own, parts are not independent.
 struct PairScore {
   int frame_b = 0;  // second frame, index into Recording::frames
   double time_s = 0.0;
