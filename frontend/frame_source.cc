@@ -23,7 +23,7 @@ class ImageFrames : public FrameSource {
       : FrameSource(recording), format_(format) {}
 
   Status SkipTo(size_t frame) override {
-    next_ = std::max(next_, frame);
+    next_ = std::max(next_, std::min(frame, recording_.frames.size()));
     return {};
   }
 

@@ -14,7 +14,9 @@ namespace {
 struct ScoreSum {
   double chi2 = 0.0, log_det = 0.0;
   int residuals = 0;
-  double delay_chi2 = 0.0;  // g^2 / H of t_d, summed over the blocks
+  double pairs_delay_chi2 = 0.0;  // g^2 / H of t_d, summed over the pairs
+  int pairs = 0;
+  double delay_chi2 = 0.0;  // the same, over the blocks
   double focal_chi2 = 0.0;  // of f
   double focal_information = 0.0;
   int blocks = 0;
@@ -56,6 +58,9 @@ ScoreSum ScoreAt(const simulation::Simulated& simulated, double spread_s,
   // Its pairs are parts of a block.
   std::vector<BlockScore> parts = scores.blocks;
   for (const PairScore& pair : scores.pairs) {
+    sum.pairs_delay_chi2 +=
+        pair.g[kStateDelay] * pair.g[kStateDelay] / pair.H(kStateDelay, kStateDelay);
+    ++sum.pairs;
     BlockScore& rest = parts[static_cast<size_t>(pair.block)];
     rest.g -= pair.g;
     rest.H.topLeftCorner(scores.num_model, scores.num_model) -= pair.H;
@@ -83,8 +88,11 @@ TEST(PairScores, AllowForTheFramesOwnTimes) {
   EXPECT_GT(without.chi2, 1.5 * without.residuals);
   EXPECT_NEAR(with.chi2 / with.residuals, 1.0, 0.1);
   EXPECT_EQ(without.log_det, 0.0);
-  // So does what a block says of the delay, and of the focal length, for which it matters that two
-  // pairs have a frame and its time in common: each is chi-square of one degree of freedom.
+  // So does what a pair says of the delay (here they have no frame in common): each is chi-square
+  // of one degree of freedom.
+  EXPECT_GT(without.pairs_delay_chi2, 3.0 * without.pairs);
+  EXPECT_NEAR(with.pairs_delay_chi2 / with.pairs, 1.0, 5.0 * std::sqrt(2.0 / with.pairs));
+  // So does what a block says of the delay, and of the focal length.
   EXPECT_GT(without.delay_chi2, 3.0 * without.blocks);
   EXPECT_NEAR(with.delay_chi2 / with.blocks, 1.0, 4.0 * std::sqrt(2.0 / with.blocks));
   EXPECT_NEAR(with.focal_chi2 / with.blocks, 1.0, 4.0 * std::sqrt(2.0 / with.blocks));

@@ -243,6 +243,13 @@ TEST(FolderReader, HandsOutImagesInOrder) {
   }
   EXPECT_FALSE((*frames)->Next(&gray).value());
   EXPECT_FALSE((*frames)->Next(&gray).value());  // and stays at the end
+
+  frames = OpenFrames(*recording);
+  ASSERT_TRUE((*frames)->SkipTo(2));
+  ASSERT_TRUE((*frames)->Next(&gray).value());
+  EXPECT_EQ(cv::norm(gray, Picture(2), cv::NORM_INF), 0.0);
+  ASSERT_TRUE((*frames)->SkipTo(100));  // beyond the end
+  EXPECT_FALSE((*frames)->Next(&gray).value());
 }
 
 TEST(FolderReader, ImagesHaveColourPlanes) {
