@@ -212,7 +212,7 @@ std::optional<SimulatedCamera::Observation> SimulatedCamera::Observe(
     if (std::abs(exposed_s - time_s) < 1e-13) {
       const std::optional<Vector2d> seen = MeanOverExposure(frame, point_world, *px, exposed_s);
       if (!seen || !InPicture(*seen)) return std::nullopt;
-      return Observation{*seen, exposed_s, point.z()};
+      return Observation{*seen, *seen - *px, exposed_s, point.z()};
     }
     // Newton's method with the motion of a static point through a pinhole: what this neglects
     // costs iterations, not accuracy.

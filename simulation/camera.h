@@ -50,8 +50,9 @@ class SimulatedCamera {
 
   struct Observation {
     Eigen::Vector2d sensor_px;
-    double time_s = 0.0;   // exposure of that pixel
-    double depth_m = 0.0;  // along the optical axis
+    Eigen::Vector2d averaging_px;  // of it, what the mean over the exposure makes
+    double time_s = 0.0;           // exposure of that pixel
+    double depth_m = 0.0;          // along the optical axis
   };
   // Where and when a point is seen: solves time = ExposureTime(pixel of the point at time) to
   // 1e-13 s. Nothing if the point is behind the camera, off the picture, or has no solution.

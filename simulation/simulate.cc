@@ -214,7 +214,9 @@ class Tracker {
     if (!defines) measured += noise;
     if (truth.outlier) measured += gross;
     if (!camera_.InPicture(measured)) return false;
-    if (options.reanchored && !defines && !Anchor(frame, measured, seen->depth_m, landmark)) {
+    // The new point is one that is seen there, averaged over the exposure as the old one was.
+    if (options.reanchored && !defines &&
+        !Anchor(frame, measured - seen->averaging_px, seen->depth_m, landmark)) {
       return false;
     }
     tracks->push_back({landmark->id, measured});
