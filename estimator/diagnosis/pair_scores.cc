@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "core/parallel.h"
@@ -14,11 +15,11 @@ namespace camgyro {
 namespace {
 
 // A pair's equations with what is its own projected out, but for the frames' own times, which it
-// shares with the pairs before and after it: these are its rows of `frames`.
+// shares with the pairs before and after it. MakePairSystem linearises each pair at the times that
+// its own matches tell; here these are the stamps, for all pairs alike.
 struct PairAlone {
   std::array<int, 2> frames = {0, 0};
   double frame_time_prior = 0.0;  // 1 / s^2
-  Eigen::Vector2d at;             // where the times are [s]
   double chi2 = 0.0;
   Eigen::VectorXd g;
   Eigen::MatrixXd H;
@@ -57,67 +58,94 @@ PairAlone ProjectOwnOut(const PairSystem& s, const TimedPair& pair) {
     const Eigen::MatrixXd NT = N.transpose() * T;
     p.frames = {pair.frame_a, pair.frame_b};
     p.frame_time_prior = s.prior[first];
-    p.at = s.at.segment<2>(first);
     p.times_g = T.transpose() * s.r - NT.transpose() * x;
     p.times_H = T.transpose() * T - NT.transpose() * solver.solve(NT);
     p.times_by_columns = T.transpose() * s.J - NT.transpose() * X;
+    const Eigen::Vector2d to_stamps = -s.at.segment<2>(first);
+    const Eigen::VectorXd change = p.times_H * to_stamps;
+    p.g += p.times_by_columns.transpose() * to_stamps;
+    p.chi2 += to_stamps.dot(2.0 * p.times_g + change);
+    p.times_g += change;
   }
   return p;
 }
 
-// Sums the pairs of a block, with the frames' own times projected out of all of them together: of
-// each pair by itself, every interval between frames would be as open as one frame's time is
-// (docs/lab/random_devices.md).
-void SumUp(const std::vector<PairAlone>& projected, int num_model, std::vector<PairScore>* pairs,
-           BlockScore* block) {
-  std::map<int, Eigen::Index> rows;  // of each frame that has a time
-  std::map<int, double> uses;
-  for (const PairAlone& p : projected) {
-    if (p.times_g.size() == 0) continue;
-    for (const int frame : p.frames) {
-      rows.emplace(frame, static_cast<Eigen::Index>(rows.size()));
-      ++uses[frame];
-    }
-  }
-  const auto frames = static_cast<Eigen::Index>(rows.size());
-  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(frames, frames);
-  Eigen::MatrixXd by_columns = Eigen::MatrixXd::Zero(frames, block->g.size());
-  Eigen::VectorXd b = Eigen::VectorXd::Zero(frames);
-  double log_prior = 0.0;
-  for (const PairAlone& p : projected) {
-    for (Eigen::Index i = 0; i < p.times_g.size(); ++i) {
-      const int frame = p.frames.at(static_cast<size_t>(i));
-      const Eigen::Index row = rows[frame];
-      const double part = 1.0 / uses[frame];  // of the prior, which each frame has once
-      b[row] += p.times_g[i] + part * p.frame_time_prior * p.at[i];
-      D(row, row) += part * p.frame_time_prior;
-      log_prior += part * std::log(p.frame_time_prior);
-      by_columns.row(row) += p.times_by_columns.row(i);
-      for (Eigen::Index j = 0; j < 2; ++j) {
-        D(row, rows[p.frames.at(static_cast<size_t>(j))]) += p.times_H(i, j);
+// The own times of a block's frames [s after their stamps], linear in all columns. Each frame has
+// one, whatever the pairs that it is in: of each pair by itself, every interval between frames
+// would be as open as one frame's time is (docs/lab/random_devices.md).
+class TimesOfBlock {
+ public:
+  TimesOfBlock(const std::vector<PairAlone>& pairs, Eigen::Index columns) {
+    std::map<int, double> uses;
+    for (const PairAlone& p : pairs) {
+      if (p.times_g.size() == 0) continue;
+      for (const int frame : p.frames) {
+        rows_.emplace(frame, static_cast<Eigen::Index>(rows_.size()));
+        ++uses[frame];
       }
     }
+    const auto frames = static_cast<Eigen::Index>(rows_.size());
+    Eigen::MatrixXd D = Eigen::MatrixXd::Zero(frames, frames);
+    Eigen::MatrixXd by_columns = Eigen::MatrixXd::Zero(frames, columns);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(frames);
+    for (const PairAlone& p : pairs) {
+      for (Eigen::Index i = 0; i < p.times_g.size(); ++i) {
+        const int frame = p.frames.at(static_cast<size_t>(i));
+        const Eigen::Index row = rows_[frame];
+        const double part = 1.0 / uses[frame];  // of the prior, which each frame has once
+        b[row] += p.times_g[i];
+        D(row, row) += part * p.frame_time_prior;
+        log_det_ -= part * std::log(p.frame_time_prior);
+        by_columns.row(row) += p.times_by_columns.row(i);
+        for (Eigen::Index j = 0; j < 2; ++j) {
+          D(row, rows_[p.frames.at(static_cast<size_t>(j))]) += p.times_H(i, j);
+        }
+      }
+    }
+    if (frames == 0) return;
+    const Eigen::LDLT<Eigen::MatrixXd> solver(D);
+    log_det_ += solver.vectorD().array().log().sum();
+    by_columns_ = -solver.solve(by_columns);
+    best_s_ = -solver.solve(b);
   }
-  const Eigen::LDLT<Eigen::MatrixXd> solver(D);
-  const Eigen::MatrixXd Y = solver.solve(by_columns);
-  const Eigen::VectorXd y = solver.solve(b);
-  if (frames > 0) block->log_det = solver.vectorD().array().log().sum() - log_prior;
+
+  bool empty() const { return rows_.empty(); }
+  double log_det() const { return log_det_; }  // over that of the prior
+  // With the columns as they are, and how the columns change them. Of a frame of no pair: its
+  // stamp.
+  double Best(int frame) const {
+    const auto row = rows_.find(frame);
+    return row == rows_.end() ? 0.0 : best_s_[row->second];
+  }
+  auto ByColumns(int frame) const { return by_columns_.row(rows_.at(frame)); }
+
+ private:
+  std::map<int, Eigen::Index> rows_;
+  Eigen::MatrixXd by_columns_;
+  Eigen::VectorXd best_s_;
+  double log_det_ = 0.0;
+};
+
+// Sums the pairs of a block, with the frames' own times projected out of all of them together.
+void SumUp(const std::vector<PairAlone>& projected, int num_model, std::vector<PairScore>* pairs,
+           BlockScore* block) {
+  const TimesOfBlock times(projected, block->g.size());
+  block->log_det = times.log_det();
   for (size_t k = 0; k < projected.size(); ++k) {
     const PairAlone& p = projected[k];
     PairScore& pair = (*pairs)[k];
     Eigen::MatrixXd H = p.H;
     pair.g = p.g;
     pair.chi2 = p.chi2;
-    pair.log_det = frames > 0 ? block->log_det / static_cast<double>(projected.size()) : 0.0;
+    pair.log_det = times.log_det() / static_cast<double>(projected.size());
     for (Eigen::Index i = 0; i < p.times_g.size(); ++i) {
       const int frame = p.frames.at(static_cast<size_t>(i));
-      const Eigen::Index row = rows[frame];
-      const double pull = p.frame_time_prior * p.at[i] / uses[frame];
-      pair.g -= p.times_by_columns.row(i).transpose() * y[row];
-      pair.chi2 += pull * p.at[i] - (p.times_g[i] + pull) * y[row];
+      const auto by_columns = p.times_by_columns.row(i).transpose();
+      pair.g += by_columns * times.Best(frame);
+      pair.chi2 += p.times_g[i] * times.Best(frame);
       // Half of it and half of its transpose: the sum over the block is symmetric anyway.
-      const Eigen::MatrixXd half = 0.5 * p.times_by_columns.row(i).transpose() * Y.row(row);
-      H -= half + half.transpose();
+      const Eigen::MatrixXd half = 0.5 * by_columns * times.ByColumns(frame);
+      H += half + half.transpose();
     }
     block->g += pair.g;
     block->H += H;
@@ -167,19 +195,31 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
     sum.H.setZero(size, size);
     if (!block.empty()) sum.time_s = 0.5 * (block.front().time_a_s + block.back().time_b_s);
     std::vector<PairAlone> projected;
-    for (const TimedPair& pair : block) {
-      PairSystem system;
-      if (!MakePairSystem(input, pair, calibration, all, noise, options, &system)) continue;
-      PairScore score;
-      score.frame_b = pair.frame_b;
-      score.time_s = pair.time_b_s;
-      // The direction takes two; the bend none, since chi2 has the penalty of its prior.
-      score.residuals = static_cast<int>(system.r.size()) -
-                        (ResidualOf(pair, options).facts().has_direction ? 2 : 0);
-      score.latent_gain = GainOfFreeBend(system);
-      projected.push_back(ProjectOwnOut(system, pair));
-      pairs[b].push_back(std::move(score));
-    }
+    const auto linearise = [&](const TimesOfBlock* times) {
+      projected.clear();
+      pairs[b].clear();
+      for (const TimedPair& pair : block) {
+        PairSystem system;
+        std::optional<Eigen::Vector2d> times_s;
+        if (times) times_s.emplace(times->Best(pair.frame_a), times->Best(pair.frame_b));
+        if (!MakePairSystem(input, pair, calibration, all, noise, options, &system, times_s)) {
+          continue;
+        }
+        PairScore score;
+        score.frame_b = pair.frame_b;
+        score.time_s = pair.time_b_s;
+        // The direction takes two; the bend none, since chi2 has the penalty of its prior.
+        score.residuals = static_cast<int>(system.r.size()) -
+                          (ResidualOf(pair, options).facts().has_direction ? 2 : 0);
+        score.latent_gain = GainOfFreeBend(system);
+        projected.push_back(ProjectOwnOut(system, pair));
+        pairs[b].push_back(std::move(score));
+      }
+    };
+    linearise(nullptr);
+    // That was at the times that each pair's own matches tell, which differ by what each has wrong.
+    const TimesOfBlock times(projected, size);
+    if (!times.empty()) linearise(&times);
     SumUp(projected, scores.num_model, &pairs[b], &sum);
   });
   for (size_t b = 0; b < blocks.size(); ++b) {

@@ -63,15 +63,21 @@ struct LinearPair {
 // False where the gyro does not cover the pair, or it has too few matches or no value.
 bool LinearizePair(const PairResidual& residual, const EstimationInput& input,
                    const TimedPair& pair, const Calibration& c, const AllEffects& all, double noise,
-                   const PairGraphOptions& options, LinearPair* linear) {
+                   const PairGraphOptions& options, const std::optional<Eigen::Vector2d>& times_s,
+                   LinearPair* linear) {
   PairView& view = linear->view;
-  if (residual.facts().has_direction) {
+  const bool has_direction = residual.facts().has_direction;
+  if (has_direction && !times_s) {
     // At the frames' own times, if they have any.
     if (!FitPair(input, pair, c, noise, options, &view, &linear->plane)) return false;
-  } else if (!ViewPair(input, pair, c, noise, options, &view) ||
-             (!residual.facts().of_attitudes &&
-              static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches)) {
-    return false;
+  } else {
+    if (!ViewPair(input, pair, c, noise, options, &view,
+                  times_s.value_or(Eigen::Vector2d::Zero())) ||
+        (!residual.facts().of_attitudes &&
+         static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches)) {
+      return false;
+    }
+    if (has_direction) linear->plane = FitPlane(view);
   }
   auto measurement = std::make_shared<PairMeasurement>(view.measurement);
   measurement->effects = all.set->size() > 0 ? all.set : nullptr;
@@ -194,10 +200,11 @@ AllEffects AllEffectsOf(const Calibration& calibration, const EffectSet* candida
 
 bool MakePairSystem(const EstimationInput& input, const TimedPair& pair,
                     const Calibration& calibration, const AllEffects& all, double noise,
-                    const PairGraphOptions& options, PairSystem* system) {
+                    const PairGraphOptions& options, PairSystem* system,
+                    const std::optional<Eigen::Vector2d>& times_s) {
   const PairResidual& residual = ResidualOf(pair, options);
   LinearPair linear;
-  if (!LinearizePair(residual, input, pair, calibration, all, noise, options, &linear)) {
+  if (!LinearizePair(residual, input, pair, calibration, all, noise, options, times_s, &linear)) {
     return false;
   }
   FillShared(linear, calibration, all, system);

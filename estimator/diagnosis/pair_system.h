@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 
 #include "core/calibration.h"
 #include "core/effects/catalogue.h"
@@ -42,11 +43,12 @@ struct PairSystem {
 };
 
 // False where the gyro does not cover the pair, or it has too few matches or no value. noise: of a
-// pixel [px], of a rotation [rad] for attitudes.
+// pixel [px], of a rotation [rad] for attitudes. times_s: of the two frames after their stamps,
+// where the model has times of their own; nothing: those that the pair's own matches tell.
 [[nodiscard]] bool MakePairSystem(const EstimationInput& input, const TimedPair& pair,
                                   const Calibration& calibration, const AllEffects& all,
-                                  double noise, const PairGraphOptions& options,
-                                  PairSystem* system);
+                                  double noise, const PairGraphOptions& options, PairSystem* system,
+                                  const std::optional<Eigen::Vector2d>& times_s = std::nullopt);
 
 }  // namespace camgyro
 

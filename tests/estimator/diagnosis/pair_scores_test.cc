@@ -5,7 +5,10 @@
 
 #include <cmath>
 #include <memory>
+#include <utility>
+#include <vector>
 
+#include "estimator/diagnosis/score_test.h"
 #include "simulation/simulate.h"
 
 namespace camgyro {
@@ -22,12 +25,11 @@ struct ScoreSum {
   int blocks = 0;
 };
 
-// The truth with that spread of the frames' times, 0 without.
-ScoreSum ScoreAt(const simulation::Simulated& simulated, double spread_s,
-                 size_t pairs_of_a_block = 5) {
-  const Recording& recording = simulated.recording;
+// With that spread of the frames' times, 0 without.
+Scores ScoresOf(const Recording& recording, Calibration model, double spread_s,
+                size_t pairs_of_a_block = 5,
+                std::shared_ptr<const EffectSet> candidates = nullptr) {
   const EstimationInput input = MakeEstimationInput(recording, SelectPairs(recording));
-  Calibration model = simulated.truth;
   if (spread_s > 0.0) {
     const auto effects = MakeEffects("frame_stamp_jitter", MakeEffectSetup(recording, model));
     EXPECT_TRUE(effects);
@@ -42,7 +44,13 @@ ScoreSum ScoreAt(const simulation::Simulated& simulated, double spread_s,
     if (i % pairs_of_a_block == 0) blocks.emplace_back();
     blocks.back().push_back(input.pairs[i]);
   }
-  const Scores scores = ComputeScores(input, blocks, model, nullptr, 0.5, options);
+  return ComputeScores(input, blocks, model, std::move(candidates), 0.5, options);
+}
+
+// At the truth.
+ScoreSum ScoreAt(const simulation::Simulated& simulated, double spread_s,
+                 size_t pairs_of_a_block = 5) {
+  const Scores scores = ScoresOf(simulated.recording, simulated.truth, spread_s, pairs_of_a_block);
   ScoreSum sum;
   for (const BlockScore& block : scores.blocks) {
     sum.chi2 += block.chi2;
@@ -120,6 +128,29 @@ TEST(PairScores, NeighboursShareTheTimeOfAFrame) {
   const double without = ScoreAt(*simulated, 0.0).focal_information;
   EXPECT_LT(together.focal_information, without);
   EXPECT_NEAR(ScoreAt(*simulated, 0.0, 1).focal_information, without, 1e-9 * without);
+}
+
+// What the model lacks makes each pair see times of its own, which neighbours do not share: the
+// scores are to know what all of a block's pairs say of a frame's time.
+TEST(PairScores, TellWhatWrongTimesHide) {
+  const auto scenario = simulation::ParseScenario(
+      "duration_s: 10\ncamera: {rate_hz: 15}\nmotion: {kind: running}\n"
+      "tracks: {count: 100, noise_px: 0.1, reanchored: true}",
+      {"effects.frame_stamp_jitter.spread_s=0.003", "effects.gyro_scale.error=[0.005, 0.005, 0]"});
+  ASSERT_TRUE(scenario) << scenario.error().message;
+  const auto simulated = simulation::SimulateTracks(*scenario, 4);
+  ASSERT_TRUE(simulated) << simulated.error().message;
+  const Recording& recording = simulated->recording;
+  const auto candidates = MakeEffects("gyro_scale", MakeEffectSetup(recording, simulated->truth));
+  ASSERT_TRUE(candidates);
+  const Scores scores =
+      ScoresOf(recording, simulated->truth, 0.003, 20, std::make_shared<EffectSet>(*candidates));
+  std::vector<int> columns;
+  for (int i = 0; i < 3; ++i) columns.push_back(scores.num_model + i);
+  const Eigen::VectorXd step = StepOf(scores, columns, Eigen::VectorXd::Zero(scores.num_model + 3));
+  EXPECT_NEAR(step[columns[0]], 0.005, 0.001);
+  EXPECT_NEAR(step[columns[1]], 0.005, 0.001);
+  EXPECT_NEAR(step[columns[2]], 0.0, 0.001);
 }
 
 }  // namespace
