@@ -13,6 +13,7 @@
 #include "estimator/diagnosis/score_test.h"
 #include "estimator/diagnosis/shares.h"
 #include "estimator/diagnosis/thresholds.h"
+#include "estimator/diagnosis/unseen_parallax.h"
 #include "estimator/halves.h"
 #include "estimator/window/estimation_input.h"
 
@@ -31,6 +32,7 @@ struct Tested {
   std::vector<UsualColumns> usual;
   Scores scores;
   Eigen::VectorXd prior;  // information of all columns, candidates with their weak priors
+  double unseen_parallax_rad_s = 0.0;
 };
 
 // There are stretches enough to see how the scores scatter. Without, noise is all that is known of
@@ -90,6 +92,8 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
     t.scores = scores_of({input.pairs});
   }
   t.prior = PriorInformation(report.prior, model.effects.get(), *set);
+  t.unseen_parallax_rad_s = UnseenParallax(input, Scatters(t) ? Joined(shares.fit) : input.pairs,
+                                           model, report.quality.noise_px, graph);
   return t;
 }
 
@@ -185,6 +189,18 @@ void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
         (XC * u.C.block(at, at, n, n).ldlt().solve(XC.transpose())).diagonal();
     report->systematic.push_back({effect.effect, variance.cwiseMax(0.0).cwiseSqrt()});
     at += n;
+  }
+  const Eigen::Matrix<double, 3, 2> across =
+      t.unseen_parallax_rad_s * c.q_gyro_cam.toRotationMatrix().leftCols<2>();
+  StateCovariance of_bias = StateCovariance::Zero();
+  of_bias.block<3, 3>(kStateBias, kStateBias) = across * across.transpose();
+  *c.total_covariance += of_bias;
+  report->systematic.push_back({kUnseenParallax, of_bias.diagonal().cwiseSqrt()});
+  if (t.unseen_parallax_rad_s > c.sigma().segment<3>(kStateBias).maxCoeff()) {
+    report->notes.push_back(Format(
+        "what the pictures show is so far, or so equally far, that a step sideways looks like "
+        "a turn: the gyro's bias may be off by %.2g deg/s",
+        t.unseen_parallax_rad_s * 180.0 / M_PI));
   }
 }
 

@@ -23,6 +23,8 @@ namespace camgyro {
 // The last term stands because the values are not corrected by X c_hat: a correction by an effect
 // that may be another one is left to the diagnosis, which tests it on unseen frames.
 //
+// To that the gyro's bias has what parallax may hide of it (unseen_parallax.h).
+//
 // Where the two halves of the recording disagree (kHalvesLimit), the covariance was multiplied by
 // their chi-square. These effects let the halves differ as well: by X1 c - X2 c, which makes
 //   1 + tr((4 covariance)^-1 (X1 - X2) C (X1 - X2)') / kStateSize

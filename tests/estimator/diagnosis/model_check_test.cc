@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/effects/catalogue.h"
+#include "estimator/diagnosis/unseen_parallax.h"
 #include "estimator/halves.h"
 #include "tests/estimator/simulated_input.h"
 
@@ -100,6 +101,32 @@ TEST(ModelCheck, AShortRecordingHasATotalAndNoDoubt) {
   EXPECT_GT(ShareOf(c.report, "gyro_scale")[kStateFocal], 0.003 * found.lens[kFocal]);
   const StateVector in_totals = Difference(found, c.simulated.truth).cwiseQuotient(total);
   EXPECT_LT(in_totals.cwiseAbs().maxCoeff(), 3.0) << in_totals.transpose();
+}
+
+// Of things that are far, parallax is hardly more than the noise, and a step sideways looks like a
+// turn: the fit takes one for the other in all pairs alike.
+TEST(ModelCheck, TheTotalCoversTurnsThatAreSteps) {
+  const auto share = [](const Calibrated& c) {
+    return ShareOf(c.report, kUnseenParallax).segment<3>(kStateBias).maxCoeff();
+  };
+  const auto bias_in = [](const Calibrated& c, const StateVector& sigma) {
+    return Difference(c.report.calibration, c.simulated.truth)
+        .cwiseQuotient(sigma)
+        .segment<3>(kStateBias)
+        .cwiseAbs()
+        .maxCoeff();
+  };
+  const Calibrated far =
+      Check({"motion.kind=handheld", "scene.depth_law=uniform", "scene.depth_m=[30, 300]"},
+            DeviceClass::kPhone);
+  EXPECT_GT(bias_in(far, far.report.calibration.sigma()), 5.0);
+  ASSERT_TRUE(far.report.calibration.sigma_total());
+  EXPECT_LT(bias_in(far, *far.report.calibration.sigma_total()), 3.0);
+  EXPECT_THAT(far.report.notes, testing::Contains(HasSubstr("looks like a turn")));
+  // Near ones tell which it was.
+  const Calibrated near = Check({"motion.kind=handheld"}, DeviceClass::kPhone);
+  EXPECT_LT(share(near), 0.1 * share(far));
+  EXPECT_THAT(near.report.notes, testing::Not(testing::Contains(HasSubstr("looks like a turn"))));
 }
 
 bool SaysThatHalvesDisagree(const std::vector<std::string>& words) {
