@@ -3,19 +3,19 @@
 class usually show and declared by nobody, and prints how the errors compare with sigma_total:
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
-                            [--motions NAME,...] [--clean] [--strange] [--diagnose] [--jobs N]
-                            [--camgyro PATH] [KEY=VALUE ...]
+                            [--motions NAME,...] [--clean] [--strange] [--rendered] [--diagnose]
+                            [--jobs N] [--camgyro PATH] [KEY=VALUE ...]
 
 The sizes are those of the class in estimator/diagnosis/device_class.cc, read from that file. --clean
 draws nothing: for how often a doubt is said of a device that has no effect. --strange also draws how
 each was recorded: motion, length, rates, size of the picture, mounting, stamps of arrival, samples and
-frames that are missing, wrong, few and short-lived tracks, and things that move. --diagnose: what
-`diagnose` makes of the devices, instead of `calibrate`. KEY=VALUE changes the scenario of all
-recordings, as in `camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the
-errors within 3 sigma_total, their rms in sigma_total, the median of sigma_total [px, s, rad/s, rad]
-and what that is of the spread of the errors, the recordings with errors beyond 3 sigma_total (or,
-with --clean, beyond 4 sigmas of noise), and
-the NEES per parameter with the total covariance.
+frames that are missing, wrong, few and short-lived tracks, and things that move. --rendered: video of
+a scene, light and compression that are drawn instead of tracks. --diagnose: what `diagnose` makes
+of the devices, instead of `calibrate`. KEY=VALUE changes the scenario of all recordings, as in
+`camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the errors within 3
+sigma_total, their rms in sigma_total, the median of sigma_total [px, s, rad/s, rad] and what that is
+of the spread of the errors, the recordings with errors beyond 3 sigma_total (or, with --clean, beyond
+4 sigmas of noise), and the NEES per parameter with the total covariance.
 """
 import argparse
 import os
@@ -131,6 +131,34 @@ def drawn_conditions(seed, scenario):
         scenario["motion"]["kind"], scenario["duration_s"], camera["rate_hz"], gyro["rate_hz"])
 
 
+def drawn_pictures(seed, scenario):
+    """Changes a scenario to one of video, and says what it shows."""
+    random = np.random.default_rng([seed, 2])
+    kind = str(random.choice(["room", "facade", "ground", "mountains"]))
+    scenario["scene"] = {"kind": kind}
+    if kind != "mountains" and random.uniform() < 0.3:
+        scenario["scene"]["moving_objects"] = int(random.integers(1, 5))
+    motion = scenario["motion"]
+    if kind == "room":
+        if motion["kind"] != "rotation":
+            motion.update(path_radius_m=1.5, speed_m_s=float(random.uniform(0.3, 1)),
+                          heading_deg=60)
+    else:  # along the wall
+        motion["heading_deg"] = float(random.uniform(70, 110 if kind == "facade" else 180))
+    scenario["duration_s"] = min(scenario["duration_s"], 12.0)  # rendering takes long
+    camera = scenario["camera"]
+    width, height = camera.get("resolution", [720, 480])
+    if width > 720:
+        camera["focal_px"] *= 640 / width
+        camera["resolution"] = [640, 640 * height // width]
+    camera["exposure_swing"] = float(random.choice([0.0, 0.3]))
+    scenario["video"] = {
+        "format": "mp4", "crf": int(random.integers(14, 34)),
+        "full_well_electrons": float(np.exp(random.uniform(np.log(300), np.log(20000)))),
+        "vignetting": float(random.uniform(0, 0.6))}
+    return kind
+
+
 def latency_s(scenario):
     """What stamps of arrival make of the delay: a gyro whose median stamp is on time, and a camera
     whose mean stamp is, have none (docs/recording_format.md)."""
@@ -151,6 +179,8 @@ def run(options, seed):
         scenario.update(drawn_effects(options.device, seed))
     if options.strange:
         motion = drawn_conditions(seed, scenario)
+    if options.rendered:
+        motion += ", " + drawn_pictures(seed, scenario)
     with tempfile.TemporaryDirectory() as folder:
         recording, out = folder + "/recording", folder + "/out"
         with open(folder + "/scenario.yaml", "w", encoding="utf-8") as file:
@@ -171,7 +201,7 @@ def run(options, seed):
         doubts = ["the pictures show something" in done.stdout,
                   "the two halves of the recording disagree" in done.stdout]
         if not options.clean:
-            as_fitted(truth, recording, scenario["duration_s"])
+            as_fitted(truth, calibration, recording, scenario["duration_s"])
         truth["clock"]["delay_s"]["value"] += latency_s(scenario)
         error, noise = errors(calibration, truth)
         total = np.array(calibration["covariance"]["total"])
@@ -181,12 +211,16 @@ def run(options, seed):
                     name="%s %d" % (motion, seed))
 
 
-def as_fitted(truth, recording, duration_s):
+def as_fitted(truth, calibration, recording, duration_s):
     """What the effects shift by definition (docs/effects.md): a filter delays the gyro by its time
-    constant, a drifting bias is that of the middle, under the mean force."""
+    constant, a drifting bias is that of the middle, under the mean force; where a gyro's clock was
+    laid behind stamps of arrival and its rate is fitted, so is the delay."""
     values = {e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
               for e in truth["effects"]}
     truth["clock"]["delay_s"]["value"] += values["gyro_lowpass"]["time_constant"]
+    if any(e["name"] == "clock_skew" and str(e["shape"]).isdigit() for e in calibration["effects"]):
+        skew = 1e-6 * values["clock_skew"]["skew"]
+        truth["clock"]["delay_s"]["value"] += skew * (0.5 * duration_s + 0.5)
     force = np.loadtxt(recording + "/imu0/data.csv", delimiter=",")[:, 4:7].mean(axis=0)
     bias = truth["gyro"]["bias_rad_s"]
     bias["value"] = [
@@ -210,6 +244,7 @@ def main():
     parser.add_argument("--motions", default="walking,running,handheld")
     parser.add_argument("--clean", action="store_true")
     parser.add_argument("--strange", action="store_true")
+    parser.add_argument("--rendered", action="store_true")
     parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
@@ -228,7 +263,8 @@ def main():
     z = np.where(used, error / sigma, np.nan)
     print("%d of %d devices of class %s%s%s calibrated; a doubt of the model in %d, of the halves in "
           "%d" % (len(results), len(seeds), options.device, ", clean" if options.clean else "",
-                  ", strangely recorded" if options.strange else "",
+                  (", strangely recorded" if options.strange else "")
+                  + (", rendered" if options.rendered else ""),
                   *np.sum([r["doubts"] for r in results], axis=0)))
     print("| parameter | determined | within 3 sigma_total | rms error in sigma_total | "
           "sigma_total | sigma_total / spread of errors | rms error in sigma of noise |")
