@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,12 @@
 
 namespace camgyro {
 namespace {
+
+simulation::Simulated Simulate(const std::string& scenario,
+                               const std::vector<std::string>& overrides) {
+  return simulation::SimulateTracks(simulation::ParseScenario(scenario, overrides).value(), 4)
+      .value();
+}
 
 struct ScoreSum {
   double chi2 = 0.0, log_det = 0.0;
@@ -85,13 +92,10 @@ ScoreSum ScoreAt(const simulation::Simulated& simulated, double spread_s,
 }
 
 TEST(PairScores, AllowForTheFramesOwnTimes) {
-  const auto scenario = simulation::ParseScenario(
-      "duration_s: 12\nmotion: {kind: running}\ntracks: {count: 60, noise_px: 0.5}",
-      {"effects.frame_stamp_jitter.spread_s=0.002"});
-  ASSERT_TRUE(scenario) << scenario.error().message;
-  const auto simulated = simulation::SimulateTracks(*scenario, 4);
-  ASSERT_TRUE(simulated) << simulated.error().message;
-  const ScoreSum without = ScoreAt(*simulated, 0.0), with = ScoreAt(*simulated, 0.002);
+  const simulation::Simulated simulated =
+      Simulate("duration_s: 12\nmotion: {kind: running}\ntracks: {count: 60, noise_px: 0.5}",
+               {"effects.frame_stamp_jitter.spread_s=0.002"});
+  const ScoreSum without = ScoreAt(simulated, 0.0), with = ScoreAt(simulated, 0.002);
   // As the noise lets expect, and not without.
   EXPECT_GT(without.chi2, 1.5 * without.residuals);
   EXPECT_NEAR(with.chi2 / with.residuals, 1.0, 0.1);
@@ -106,7 +110,7 @@ TEST(PairScores, AllowForTheFramesOwnTimes) {
   EXPECT_NEAR(with.focal_chi2 / with.blocks, 1.0, 4.0 * std::sqrt(2.0 / with.blocks));
   // The likelihood, times integrated out, is largest at the truth; chi2 alone falls with any
   // spread.
-  const ScoreSum less = ScoreAt(*simulated, 0.001), more = ScoreAt(*simulated, 0.004);
+  const ScoreSum less = ScoreAt(simulated, 0.001), more = ScoreAt(simulated, 0.004);
   EXPECT_LT(with.chi2 + with.log_det, less.chi2 + less.log_det);
   EXPECT_LT(with.chi2 + with.log_det, more.chi2 + more.log_det);
   EXPECT_LT(more.chi2, with.chi2);
@@ -116,35 +120,29 @@ TEST(PairScores, AllowForTheFramesOwnTimes) {
 // what makes one interval longer makes the other shorter, so that both together say more of the
 // focal length than each by itself.
 TEST(PairScores, NeighboursShareTheTimeOfAFrame) {
-  const auto scenario = simulation::ParseScenario(
-      "duration_s: 6\nmotion: {kind: running}\ntracks: {count: 60, reanchored: true}",
-      {"effects.frame_stamp_jitter.spread_s=0.002"});
-  ASSERT_TRUE(scenario) << scenario.error().message;
-  const auto simulated = simulation::SimulateTracks(*scenario, 4);
-  ASSERT_TRUE(simulated) << simulated.error().message;
-  const ScoreSum together = ScoreAt(*simulated, 0.002), alone = ScoreAt(*simulated, 0.002, 1);
+  const simulation::Simulated simulated =
+      Simulate("duration_s: 6\nmotion: {kind: running}\ntracks: {count: 60, reanchored: true}",
+               {"effects.frame_stamp_jitter.spread_s=0.002"});
+  const ScoreSum together = ScoreAt(simulated, 0.002), alone = ScoreAt(simulated, 0.002, 1);
   EXPECT_GT(together.focal_information, 2.0 * alone.focal_information);
   EXPECT_LT(together.chi2 + together.log_det, alone.chi2 + alone.log_det);
-  const double without = ScoreAt(*simulated, 0.0).focal_information;
+  const double without = ScoreAt(simulated, 0.0).focal_information;
   EXPECT_LT(together.focal_information, without);
-  EXPECT_NEAR(ScoreAt(*simulated, 0.0, 1).focal_information, without, 1e-9 * without);
+  EXPECT_NEAR(ScoreAt(simulated, 0.0, 1).focal_information, without, 1e-9 * without);
 }
 
 // What the model lacks makes each pair see times of its own, which neighbours do not share: the
 // scores are to know what all of a block's pairs say of a frame's time.
 TEST(PairScores, TellWhatWrongTimesHide) {
-  const auto scenario = simulation::ParseScenario(
+  const simulation::Simulated simulated = Simulate(
       "duration_s: 10\ncamera: {rate_hz: 15}\nmotion: {kind: running}\n"
       "tracks: {count: 100, noise_px: 0.1, reanchored: true}",
       {"effects.frame_stamp_jitter.spread_s=0.003", "effects.gyro_scale.error=[0.005, 0.005, 0]"});
-  ASSERT_TRUE(scenario) << scenario.error().message;
-  const auto simulated = simulation::SimulateTracks(*scenario, 4);
-  ASSERT_TRUE(simulated) << simulated.error().message;
-  const Recording& recording = simulated->recording;
-  const auto candidates = MakeEffects("gyro_scale", MakeEffectSetup(recording, simulated->truth));
+  const Recording& recording = simulated.recording;
+  const auto candidates = MakeEffects("gyro_scale", MakeEffectSetup(recording, simulated.truth));
   ASSERT_TRUE(candidates);
   const Scores scores =
-      ScoresOf(recording, simulated->truth, 0.003, 20, std::make_shared<EffectSet>(*candidates));
+      ScoresOf(recording, simulated.truth, 0.003, 20, std::make_shared<EffectSet>(*candidates));
   std::vector<int> columns;
   for (int i = 0; i < 3; ++i) columns.push_back(scores.num_model + i);
   const Eigen::VectorXd step = StepOf(scores, columns, Eigen::VectorXd::Zero(scores.num_model + 3));
