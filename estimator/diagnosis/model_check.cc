@@ -35,6 +35,9 @@ struct Tested {
   double unseen_parallax_rad_s = 0.0;
 };
 
+// Unseen parallax is said in words where it is so many sigmas of the bias' noise.
+constexpr double kUnseenSaid = 3.0;
+
 // There are stretches enough to see how the scores scatter. Without, noise is all that is known of
 // what they say.
 bool Scatters(const Tested& t) { return t.scores.blocks.size() >= kLeastBlocks; }
@@ -196,7 +199,7 @@ void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
   of_bias.block<3, 3>(kStateBias, kStateBias) = across * across.transpose();
   *c.total_covariance += of_bias;
   report->systematic.push_back({kUnseenParallax, of_bias.diagonal().cwiseSqrt()});
-  if (t.unseen_parallax_rad_s > c.sigma().segment<3>(kStateBias).maxCoeff()) {
+  if (t.unseen_parallax_rad_s > kUnseenSaid * c.sigma().segment<3>(kStateBias).maxCoeff()) {
     report->notes.push_back(Format(
         "what the pictures show is so far, or so equally far, that a step sideways looks like "
         "a turn: the gyro's bias may be off by %.2g deg/s",
