@@ -35,9 +35,6 @@ struct Tested {
   double unseen_parallax_rad_s = 0.0;
 };
 
-// Unseen parallax is said in words where it is so many sigmas of the bias' noise.
-constexpr double kUnseenSaid = 3.0;
-
 // There are stretches enough to see how the scores scatter. Without, noise is all that is known of
 // what they say.
 bool Scatters(const Tested& t) { return t.scores.blocks.size() >= kLeastBlocks; }

@@ -116,6 +116,8 @@ constexpr double kLeastNearSpread = 0.5;
 
 // A factor of the sigmas below this one is no doubt, and would be printed as 1.0 (model_check.cc).
 constexpr double kLeastFactorSaid = 1.05;
+// Unseen parallax is said in words where it is so many sigmas of the bias' noise (model_check.cc).
+constexpr double kUnseenSaid = 3.0;
 
 // Canonical correlation of two effects beyond which this motion cannot tell them apart, and how
 // many more parameters one may have: a flexible curve contains simpler effects (candidates.cc).
