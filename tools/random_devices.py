@@ -146,7 +146,7 @@ def drawn_pictures(seed, scenario):
     else:  # along the wall
         motion["heading_deg"] = float(random.uniform(70, 110 if kind == "facade" else 180))
     scenario["duration_s"] = min(scenario["duration_s"], 12.0)  # rendering takes long
-    camera = scenario["camera"]
+    camera = scenario.setdefault("camera", {})
     width, height = camera.get("resolution", [720, 480])
     if width > 720:
         camera["focal_px"] *= 640 / width
