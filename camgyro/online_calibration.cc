@@ -118,7 +118,8 @@ Status OnlineCalibration::TryStart() {
       FindStartAndFocal(recording, RotationsFrom(recording, kMaxScanPairs), options, {});
   if (!start) return tl::unexpected(start.error());
 
-  gap_ = SelectPairs(recording, /*longest_gap=*/10, /*least_pairs=*/10).gap;
+  gap_ = SelectPairs(recording, {kGapLimitsOnline.gap, /*least_pairs=*/10, kGapLimitsOnline.far_s})
+             .gap;
 
   const Result<StartingPoint> point =
       MakeStartingPoint(recording, *start, /*effects=*/"clock_skew", ByPlane());

@@ -24,6 +24,10 @@ bool RanAway(double focal_px, double from_px);
 // factor.
 bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start);
 
+// A fit whose noise is more than so many times that of a smooth motion (NoiseOfSmoothMotion) lacks
+// something that bends the whole picture.
+constexpr double kNoiseOfAstray = 1.5;
+
 // Where the fit's focal length is far from that of the rotations, and the fit has found a
 // distortion that nothing declares: start.focal anew, of rotations seen through that lens. Without
 // it, the start may take any focal length for determined. rotations_at: may be empty; nothing is

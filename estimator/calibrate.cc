@@ -65,7 +65,7 @@ class CalibrationJob {
     if (!attitudes_ && options_.online) {
       if (const Status done = Window(); !done) return tl::unexpected(done.error());
       // What a fit of all pairs makes of an online estimate that is astray would take minutes.
-      if (online_noise_ && MayBeAstray(estimate_)) {
+      if (online_noise_ && FocalIsAstray(estimate_)) {
         if (auto better = TryWhatLeadsAstray(rotations_at, estimate_, *online_noise_)) {
           return *std::move(better);
         }
@@ -78,7 +78,7 @@ class CalibrationJob {
       if (const Status done = Refinement(); !done) return tl::unexpected(done.error());
       LookThroughFittedLens(recording_, options_, rotations_at, &report_);
       const double noise = report_.quality.noise_px;
-      if (MayBeAstray(report_.calibration)) {
+      if (FocalIsAstray(report_.calibration) || NoiseIsAstray(noise)) {
         if (auto better = TryWhatLeadsAstray(rotations_at, report_.calibration, noise)) {
           return *std::move(better);
         }
@@ -173,12 +173,19 @@ class CalibrationJob {
     return {};
   }
 
-  // The focal length has left that of the start, and nothing else was tried yet.
-  bool MayBeAstray(const Calibration& fit) const {
+  bool MayTryWhatLeadsAstray() const {
     return options_.try_what_leads_astray && options_.online && options_.refine && !attitudes_ &&
-           !tried_what_leads_astray_ &&
-           (IsFarFromRotations(fit.lens[kFocal], report_.start.focal) ||
-            RanAway(fit.lens[kFocal], from_start_.lens[kFocal]));
+           !tried_what_leads_astray_;
+  }
+
+  // The focal length has left that of the start, and nothing else was tried yet.
+  bool FocalIsAstray(const Calibration& fit) const {
+    return MayTryWhatLeadsAstray() && (IsFarFromRotations(fit.lens[kFocal], report_.start.focal) ||
+                                       RanAway(fit.lens[kFocal], from_start_.lens[kFocal]));
+  }
+  bool NoiseIsAstray(double noise_px) const {
+    return MayTryWhatLeadsAstray() && recording_.matches.empty() &&
+           noise_px > kNoiseOfAstray * NoiseOfSmoothMotion(recording_, SelectPairs(recording_));
   }
 
   // The calibration with an effect that leads fits astray and that the data bear out: of its
@@ -207,9 +214,9 @@ class CalibrationJob {
     }
     if (!best) return best;
     best->notes.push_back(Format(
-        "%s is fitted as well, although nobody asked for it: without it the focal length ran from "
-        "%.0f to %.0f px, and the noise was %.2f instead of %.2f px; %s",
-        added->name.c_str(), begin_px, astray.lens[kFocal], noise_px, best->quality.noise_px,
+        "%s is fitted as well, although nobody asked for it: without it the focal length was %.0f "
+        "px (%.0f at the start), and the noise was %.2f instead of %.2f px; %s",
+        added->name.c_str(), astray.lens[kFocal], begin_px, noise_px, best->quality.noise_px,
         added->advice.c_str()));
     clock_.Finish("other fits");
     best->times.insert(best->times.begin(),

@@ -30,7 +30,7 @@ SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
     return MakeShares(*in.recording, OutlineOf(*in.recording, selection), limits);
   };
   const bool reanchored = in.recording->match_noise == MatchNoise::kSecondImage;
-  const PairSelection near = SelectPairs(*in.recording, reanchored ? kNearestGap : kNearGap);
+  const PairSelection near = SelectPairs(*in.recording, {reanchored ? kNearestGap : kNearGap});
   map_pairs_ = shares_of(near, {kMostFitPairs, kMostChoicePairs}).choice;
   if (in.recording->HasOnlyAttitudes()) return;
   // So that no two of them share noise: as far apart as the others, and where a tracker re-anchors,

@@ -10,34 +10,6 @@
 
 namespace camgyro {
 
-PairSelection SelectPairs(const Recording& recording, int longest_gap, int least_pairs) {
-  // A little more than 0.1 s, so that 3 frames of a camera of 29.95 Hz are not too long.
-  constexpr double kLongestS = 0.2, kLongestReanchoredS = 0.101;
-  PairSelection selection;
-  if (!recording.matches.empty() || recording.tracks.empty()) return selection;
-  const bool reanchored = recording.match_noise == MatchNoise::kSecondImage;
-  const double longest_s = reanchored ? kLongestReanchoredS : kLongestS;
-  const auto matches = [&](int gap) {
-    size_t count = 0;
-    for (size_t b = static_cast<size_t>(gap); b < recording.tracks.size(); ++b) {
-      count += CountMatches(recording.tracks[b - static_cast<size_t>(gap)], recording.tracks[b]);
-    }
-    return static_cast<double>(count);
-  };
-  const double interval_s = MedianInterval(recording.frames);
-  const int frames = static_cast<int>(recording.tracks.size());
-  const double neighbours = matches(1);
-  for (int gap = reanchored ? 2 : 3; gap <= longest_gap; gap += reanchored ? 1 : 2) {
-    const int stride = reanchored ? gap : 2;
-    if (gap * interval_s > longest_s || frames < least_pairs * stride + gap ||
-        matches(gap) < kLeastMatchesOfGap * neighbours) {
-      break;
-    }
-    selection = {gap, stride};
-  }
-  return selection;
-}
-
 std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs) {
   std::vector<TimedPair> kept;
   for (const TimedPair& pair : pairs) {

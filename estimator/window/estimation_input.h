@@ -7,6 +7,7 @@
 
 #include "core/calibration.h"
 #include "core/recording.h"
+#include "estimator/window/pair_selection.h"
 #include "estimator/window/timed_pair.h"
 
 namespace camgyro {
@@ -17,30 +18,6 @@ struct EstimationInput {
   std::vector<TimedRate> rates;
   std::vector<TimedPair> pairs;
 };
-
-// Which frames of tracks make a pair: a and a + gap, for every stride-th a.
-struct PairSelection {
-  int gap = 1;
-  int stride = 1;
-
-  // Odd gaps from every second frame have every frame; pairs one after the other have their ends.
-  bool leaves_frames_out() const { return gap > 1 && stride == gap; }
-};
-
-constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
-
-// The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
-// observation does not, so that neighbours tell least, and are biased where their parallax is as
-// small as the noise (docs/lab/benchmark.md). The gap is the longest up to 0.2 s that keeps 60 % of
-// the neighbours' matches and leaves `least_pairs`. No two pairs share noise: gaps are odd and
-// pairs begin at even frames, so that every observation is in one pair. Neighbours without tracks.
-//
-// Where a tracker re-anchors at every frame (MatchNoise::kSecondImage), the error of a gap is the
-// sum of those of its frames: it grows as the root of the gap, slower than what is to be seen, and
-// each frame's is in one pair if a pair begins where the one before has ended. The longest gap is
-// 0.1 s there: up to it, sigmas are about those of neighbours, in a half to two thirds of the time,
-// and beyond it they grow (docs/lab/pairs.md).
-PairSelection SelectPairs(const Recording& recording, int longest_gap = 10, int least_pairs = 100);
 
 // Pairs from matches, tracks (which of them: `selection`) or attitudes. Matches come in the pairs
 // that the file has. Attitudes are taken of neighbours. (Further apart they move the delay:

@@ -92,39 +92,6 @@ TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
       1e-6);
 }
 
-TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
-  simulation::Scenario scenario = ShortScenario(10.0);
-  const Recording recording = SimulateTracks(scenario)->recording;
-  const PairSelection selection = SelectPairs(recording);
-  EXPECT_EQ(selection.gap % 2, 1);
-  EXPECT_EQ(selection.stride, 2);
-  const EstimationInput input = MakeEstimationInput(recording, selection);
-  EXPECT_GE(input.pairs.size(), 100u);
-  size_t matches = 0;
-  std::set<int> seen;
-  for (const TimedPair& pair : input.pairs) {
-    EXPECT_TRUE(seen.insert(pair.frame_a).second && seen.insert(pair.frame_b).second);
-    EXPECT_GE(pair.frame_b - pair.frame_a, 3);
-    matches += pair.matches.size();
-  }
-  EXPECT_GT(static_cast<double>(matches) / static_cast<double>(input.pairs.size()), 30.0);
-
-  Recording reanchored = recording;
-  reanchored.match_noise = MatchNoise::kSecondImage;
-  const PairSelection chain = SelectPairs(reanchored);  // 301 frames are too few for 3
-  EXPECT_EQ(chain.gap, 2);
-  EXPECT_EQ(chain.stride, 2);
-  EXPECT_TRUE(chain.leaves_frames_out());
-  EXPECT_FALSE(selection.leaves_frames_out());
-  EXPECT_FALSE(SelectPairs(reanchored, /*longest_gap=*/1).leaves_frames_out());
-  EXPECT_EQ(SelectPairs(reanchored, /*longest_gap=*/10, /*least_pairs=*/50).gap, 3);  // 0.1 s
-
-  // Too short for 100 pairs, or tracks too short: neighbours.
-  EXPECT_EQ(SelectPairs(SimulateTracks(ShortScenario(3.0))->recording).gap, 1);
-  scenario.tracks.mean_life_frames = 4.0;
-  EXPECT_EQ(SelectPairs(SimulateTracks(scenario)->recording).gap, 1);
-}
-
 TEST(SideBySide, LeavesPairsOutThatOverlap) {
   const Recording recording = SimulateTracks(ShortScenario(1.0))->recording;
   const EstimationInput input = MakeEstimationInput(recording, {5, 2});

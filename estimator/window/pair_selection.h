@@ -1,0 +1,70 @@
+// Which frames of a recording's tracks make a pair.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_PAIR_SELECTION_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_PAIR_SELECTION_H_
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "core/recording.h"
+
+namespace camgyro {
+
+// Frames a and a + gap, for every stride-th a.
+struct PairSelection {
+  int gap = 1;
+  int stride = 1;
+
+  // Odd gaps from every second frame have every frame; pairs one after the other have their ends.
+  bool leaves_frames_out() const { return gap > 1 && stride == gap; }
+};
+
+constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
+
+struct GapLimits {
+  int gap = std::numeric_limits<int>::max();
+  int least_pairs = 100;  // that the gap has to leave
+  // Where parallax is small. Beyond, too few tracks last, and t_r and t_d lose more than the rest
+  // gains (docs/lab/pairs.md).
+  double far_s = 0.8;
+};
+// Of estimators that go along: pairs that do not overlap are few, if they are long.
+constexpr GapLimits kGapLimitsOnline{std::numeric_limits<int>::max(), 100, 0.3};
+
+// The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
+// observation does not, so that neighbours tell least, and are biased where their parallax is as
+// small as the noise (docs/lab/benchmark.md). The gap is the longest up to 9 frames and 0.2 s that
+// keeps 60 % of the neighbours' matches and leaves enough pairs; where things are so far away, or
+// so equally far, that parallaxes differ by less than kLeastParallax there, the shortest gap at
+// which they do, or as long as the limits allow. No two pairs share noise: gaps are odd and pairs
+// begin at even frames, so that every observation is in one pair. Neighbours without tracks.
+//
+// Where a tracker re-anchors at every frame (MatchNoise::kSecondImage), the error of a gap is the
+// sum of those of its frames: it grows as the root of the gap, slower than what is to be seen, and
+// each frame's is in one pair if a pair begins where the one before has ended. The longest gap is
+// 0.1 s there: up to it, sigmas are about those of neighbours, in a half to two thirds of the time,
+// and beyond it they grow (docs/lab/pairs.md).
+PairSelection SelectPairs(const Recording& recording, const GapLimits& limits = {});
+
+// What of a pair's displacements is no smooth function of the place in the picture, as all that a
+// turn, a lens, a shutter or a plane makes is: the sum of the variances of both coordinates, robust
+// [px^2]. Smooth is a polynomial, of the third degree if there are matches enough: turned by 0.1
+// rad, a pinhole camera leaves 0.1 px of the fourth. Negative if there are too few for any.
+double UnsmoothVariance(const std::vector<Match>& matches, const Eigen::Vector2d& size_px);
+
+// By how much parallaxes of a pair should differ [standard deviation, in noise of a displacement].
+constexpr double kLeastParallax = 2.0;
+
+// By how much parallaxes differ for each frame of a gap, likewise. It is found without a
+// calibration, from tracks whose observations have errors of their own: UnsmoothVariance over `gap`
+// frames (at least 2) less that between neighbours. Infinite where no pair has enough matches.
+double ParallaxPerFrame(const Recording& recording, int gap);
+
+// Noise of an observation in the pairs of a selection, per coordinate, by the UnsmoothVariance of
+// neighbours. Their parallax is in it, so that a fit with more noise explains less than somebody
+// who knows nothing of cameras [px]. Infinite where no pair has enough matches.
+double NoiseOfSmoothMotion(const Recording& recording, const PairSelection& selection);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_PAIR_SELECTION_H_

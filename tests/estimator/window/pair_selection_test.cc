@@ -1,0 +1,85 @@
+#include "estimator/window/pair_selection.h"
+
+#include <gmock/gmock.h>
+
+#include <set>
+
+#include "estimator/window/estimation_input.h"
+#include "tests/estimator/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+using simulation::Scenario;
+using simulation::SimulateTracks;
+
+Scenario WithDepths(double nearest_m, double farthest_m) {
+  Scenario scenario = ShortScenario(10.0);
+  scenario.scene.depth_law = simulation::DepthLaw::kUniform;
+  scenario.scene.depth_m = {nearest_m, farthest_m};
+  return scenario;
+}
+
+TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
+  simulation::Scenario scenario = ShortScenario(10.0);
+  const Recording recording = SimulateTracks(scenario)->recording;
+  const PairSelection selection = SelectPairs(recording);
+  EXPECT_EQ(selection.gap % 2, 1);
+  EXPECT_EQ(selection.stride, 2);
+  const EstimationInput input = MakeEstimationInput(recording, selection);
+  EXPECT_GE(input.pairs.size(), 100u);
+  size_t matches = 0;
+  std::set<int> seen;
+  for (const TimedPair& pair : input.pairs) {
+    EXPECT_TRUE(seen.insert(pair.frame_a).second && seen.insert(pair.frame_b).second);
+    EXPECT_GE(pair.frame_b - pair.frame_a, 3);
+    matches += pair.matches.size();
+  }
+  EXPECT_GT(static_cast<double>(matches) / static_cast<double>(input.pairs.size()), 30.0);
+
+  Recording reanchored = recording;
+  reanchored.match_noise = MatchNoise::kSecondImage;
+  const PairSelection chain = SelectPairs(reanchored);  // 301 frames are too few for 3
+  EXPECT_EQ(chain.gap, 2);
+  EXPECT_EQ(chain.stride, 2);
+  EXPECT_TRUE(chain.leaves_frames_out());
+  EXPECT_FALSE(selection.leaves_frames_out());
+  EXPECT_FALSE(SelectPairs(reanchored, {/*gap=*/1}).leaves_frames_out());
+  EXPECT_EQ(SelectPairs(reanchored, {/*gap=*/10, /*least_pairs=*/50}).gap, 3);  // 0.1 s
+
+  // Too short for 100 pairs, or tracks too short: neighbours.
+  EXPECT_EQ(SelectPairs(SimulateTracks(ShortScenario(3.0))->recording).gap, 1);
+  scenario.tracks.mean_life_frames = 4.0;
+  EXPECT_EQ(SelectPairs(SimulateTracks(scenario)->recording).gap, 1);
+}
+
+// The root of the variance of all that is no smooth motion, whoever turns and however: nearly none
+// without parallax, and in proportion to how fast the camera moves past things.
+TEST(ParallaxPerFrame, IsThatOfTheScene) {
+  constexpr int kGap = 5;
+  Scenario scenario = WithDepths(4.0, 12.0);
+  const double walking = ParallaxPerFrame(SimulateTracks(scenario)->recording, kGap);
+  scenario.tracks.outlier_fraction = 0.1;
+  EXPECT_NEAR(ParallaxPerFrame(SimulateTracks(scenario)->recording, kGap), walking, 0.3 * walking);
+  scenario.tracks.outlier_fraction = 0.0;
+  scenario.tracks.noise_px *= 2.0;
+  EXPECT_NEAR(ParallaxPerFrame(SimulateTracks(scenario)->recording, kGap), 0.5 * walking,
+              0.2 * walking);
+  // Twice as far.
+  scenario = WithDepths(8.0, 24.0);
+  EXPECT_NEAR(ParallaxPerFrame(SimulateTracks(scenario)->recording, kGap), 0.5 * walking,
+              0.15 * walking);
+  scenario = WithDepths(1e5, 1e6);
+  EXPECT_LT(ParallaxPerFrame(SimulateTracks(scenario)->recording, kGap), 0.05);
+  // What is left is the noise.
+  const Recording far = SimulateTracks(scenario)->recording;
+  EXPECT_NEAR(NoiseOfSmoothMotion(far, {kGap, 2}), scenario.tracks.noise_px,
+              0.05 * scenario.tracks.noise_px);
+  // Too few matches to tell.
+  scenario.tracks.count = 2;
+  EXPECT_EQ(ParallaxPerFrame(SimulateTracks(scenario)->recording, kGap),
+            std::numeric_limits<double>::infinity());
+}
+
+}  // namespace
+}  // namespace camgyro
