@@ -127,6 +127,10 @@ PairSelection SelectPairs(const Recording& recording, const GapLimits& limits) {
   }
   for (int gap = 3; gap <= kLongest && take(gap, kLongestS); gap += 2) {
   }
+  if (selection.gap < 3) return selection;
+  const double parallax = ParallaxPerFrame(recording, selection.gap);
+  while (selection.gap * parallax < kLeastParallax && take(selection.gap + 2, limits.far_s)) {
+  }
   return selection;
 }
 

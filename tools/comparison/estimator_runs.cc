@@ -148,7 +148,9 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
   const auto run_window = [&] {
     if (window) return;
     window.emplace();
-    Measure([&] { window_trace = RunWindow(input, data, fit); }, &*window);
+    const EstimationInput short_pairs =
+        MakeEstimationInput(input.recording, SelectPairs(input.recording, kGapLimitsOnline));
+    Measure([&] { window_trace = RunWindow(input, short_pairs, fit); }, &*window);
     TakeTrace(window_trace, input, &*window);
   };
   for (const std::string& name : names) {

@@ -53,6 +53,26 @@ TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
   EXPECT_EQ(SelectPairs(SimulateTracks(scenario)->recording).gap, 1);
 }
 
+// Far things, or all equally far: the gap has parallaxes that differ, or is as long as it may be.
+TEST(SelectPairs, TakesLongerGapsWhereThingsAreFar) {
+  const Recording near = SimulateTracks(WithDepths(1.5, 20.0))->recording,
+                  far = SimulateTracks(WithDepths(30.0, 300.0))->recording,
+                  equal = SimulateTracks(WithDepths(45.0, 55.0))->recording;
+  const int usual = SelectPairs(near).gap;
+  EXPECT_LE(usual, 6);  // 0.2 s at 30 frames/s
+  EXPECT_GE(usual * ParallaxPerFrame(near, usual), kLeastParallax);
+  EXPECT_LT(usual * ParallaxPerFrame(far, usual), 0.5 * kLeastParallax);
+  for (const Recording* recording : {&far, &equal}) {
+    const PairSelection selection = SelectPairs(*recording);
+    EXPECT_GT(selection.gap, 2 * usual);
+    EXPECT_LE(selection.gap, 24);  // 0.8 s
+    EXPECT_EQ(selection.gap % 2, 1);
+    EXPECT_EQ(selection.stride, 2);
+    EXPECT_EQ(SelectPairs(*recording, kGapLimitsOnline).gap, 9);  // 0.3 s
+    EXPECT_LE(SelectPairs(*recording, {/*gap=*/7}).gap, 7);
+  }
+}
+
 // The root of the variance of all that is no smooth motion, whoever turns and however: nearly none
 // without parallax, and in proportion to how fast the camera moves past things.
 TEST(ParallaxPerFrame, IsThatOfTheScene) {
