@@ -92,8 +92,8 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
     t.scores = scores_of({input.pairs});
   }
   t.prior = PriorInformation(report.prior, model.effects.get(), *set);
-  t.unseen_parallax_rad_s = UnseenParallax(input, Scatters(t) ? Joined(shares.fit) : input.pairs,
-                                           model, report.quality.noise_px, graph);
+  t.unseen_parallax_rad_s = UnseenParallax(Scatters(t) ? Joined(shares.fit) : input.pairs, model,
+                                           report.quality.noise_px, graph);
   return t;
 }
 
