@@ -95,7 +95,7 @@ double NoiseOfSmoothMotion(const Recording& recording, const PairSelection& sele
 PairSelection SelectPairs(const Recording& recording, const GapLimits& limits) {
   // A little more than 0.1 s, so that 3 frames of a camera of 29.95 Hz are not too long.
   constexpr double kLongestS = 0.2, kLongestReanchoredS = 0.101;
-  constexpr int kLongest = 9;
+  constexpr int kLongest = 9;  // frames, where nothing is far
   PairSelection selection;
   if (!recording.matches.empty() || recording.tracks.empty()) return selection;
   const bool reanchored = recording.match_noise == MatchNoise::kSecondImage;
@@ -121,16 +121,16 @@ PairSelection SelectPairs(const Recording& recording, const GapLimits& limits) {
     return true;
   };
   if (reanchored) {
-    for (int gap = 2; gap <= kLongest && take(gap, kLongestReanchoredS); ++gap) {
-    }
+    int gap = 2;
+    while (gap <= kLongest && take(gap, kLongestReanchoredS)) ++gap;
     return selection;
   }
-  for (int gap = 3; gap <= kLongest && take(gap, kLongestS); gap += 2) {
-  }
+  int gap = 3;
+  while (gap <= kLongest && take(gap, kLongestS)) gap += 2;
   if (selection.gap < 3) return selection;
   const double parallax = ParallaxPerFrame(recording, selection.gap);
-  while (selection.gap * parallax < kLeastParallax && take(selection.gap + 2, limits.far_s)) {
-  }
+  gap = selection.gap;
+  while (gap * parallax < kLeastParallax && take(gap + 2, limits.far_s)) gap += 2;
   return selection;
 }
 
