@@ -2,9 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <limits>
 #include <set>
 
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/refinement.h"
 #include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
@@ -71,6 +74,30 @@ TEST(SelectPairs, TakesLongerGapsWhereThingsAreFar) {
     EXPECT_EQ(SelectPairs(*recording, kGapLimitsOnline).gap, 9);  // 0.3 s
     EXPECT_LE(SelectPairs(*recording, {/*gap=*/7}).gap, 7);
   }
+}
+
+// Somebody walks past things that are 30 to 300 m away: in pairs of usual length their parallax
+// passes for a turn, by many sigmas.
+TEST(SelectPairs, LeavesNoParallaxToPassForATurn) {
+  double errors[2] = {0.0, 0.0};  // of the bias about x: usual length, as selected [rad/s]
+  for (const uint64_t seed : {1, 2}) {
+    Scenario scenario = WithDepths(30.0, 300.0);
+    scenario.duration_s = 8.0;
+    scenario.seed = seed;
+    scenario.tracks.noise_px = 0.5;
+    const simulation::Simulated s = SimulateTracks(scenario).value();
+    for (const bool longer : {false, true}) {
+      const EstimationInput input =
+          MakeEstimationInput(s.recording, longer ? SelectPairs(s.recording) : PairSelection{5, 2});
+      const Prior start = StartOffTheTruth(s.truth);
+      const Result<Refined> refined = Refine(input, input.pairs, start.mean, start, {});
+      ASSERT_TRUE(refined.has_value()) << refined.error().message;
+      errors[longer ? 1 : 0] +=
+          std::abs((refined->calibration.bias_gyro_rad_s - s.truth.bias_gyro_rad_s).x()) / 2.0;
+    }
+  }
+  EXPECT_GT(errors[0], 1e-3);
+  EXPECT_LT(errors[1], 0.25 * errors[0]);
 }
 
 // The root of the variance of all that is no smooth motion, whoever turns and however: nearly none

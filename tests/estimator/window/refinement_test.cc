@@ -92,30 +92,6 @@ TEST(Refinement, WeighsPairsByTheirNoise) {
   EXPECT_LT(errors[1], 0.8 * errors[0]);
 }
 
-// Somebody walks past things that are 30 to 300 m away: in pairs of usual length their parallax
-// passes for a turn, by many sigmas.
-TEST(Refinement, FarThingsAreNotTakenForATurn) {
-  double errors[2] = {0.0, 0.0};  // of the bias about x: usual length, as selected [rad/s]
-  for (const uint64_t seed : {1, 2}) {
-    Scenario scenario = ShortScenario(8.0);
-    scenario.seed = seed;
-    scenario.tracks.noise_px = 0.5;
-    scenario.scene.depth_law = simulation::DepthLaw::kUniform;
-    scenario.scene.depth_m = {30.0, 300.0};
-    const Simulated s = SimulateTracks(scenario).value();
-    for (const bool longer : {false, true}) {
-      const EstimationInput input =
-          MakeEstimationInput(s.recording, longer ? SelectPairs(s.recording) : PairSelection{5, 2});
-      const Result<Refined> refined = RefineFromOffTheTruth(s, input);
-      ASSERT_TRUE(refined.has_value()) << refined.error().message;
-      errors[longer ? 1 : 0] +=
-          std::abs((refined->calibration.bias_gyro_rad_s - s.truth.bias_gyro_rad_s).x()) / 2.0;
-    }
-  }
-  EXPECT_GT(errors[0], 1e-3);
-  EXPECT_LT(errors[1], 0.25 * errors[0]);
-}
-
 // Stamps that scatter by 2 ms: with times of their own the frames are where they were, and the
 // calibration is right within its sigmas; without, neither. A recording without jitter shows none.
 TEST(Refinement, FramesHaveTimesOfTheirOwn) {
