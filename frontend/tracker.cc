@@ -171,7 +171,7 @@ std::vector<TrackedPoint> KltTracker::Add(Picture picture, const PointPredictor&
 
   if (!points_.empty()) FollowPoints(picture, predictor);
   previous_ = std::move(picture);
-  AddCorners(previous_.gray);
+  AddCorners();
 
   std::vector<TrackedPoint> tracked(points_.size());
   for (size_t i = 0; i < points_.size(); ++i) {
@@ -322,7 +322,7 @@ std::vector<Eigen::Vector3d> KltTracker::NoiseFactors(
   return factors;
 }
 
-void KltTracker::AddCorners(const cv::Mat& gray) {
+void KltTracker::AddCorners() {
   if (static_cast<int>(points_.size()) >= options_.max_points) return;
   const int grid = options_.grid;
   const int share = (options_.max_points + grid * grid - 1) / (grid * grid);
@@ -333,13 +333,17 @@ void KltTracker::AddCorners(const cv::Mat& gray) {
   cv::Mat count = cv::Mat::zeros(grid, grid, CV_32S);
   for (const cv::Point2f& point : points_) ++count.at<int>(cell_of(point));
 
-  // The mask keeps new corners away from the border and from points that are followed already.
-  cv::Mat mask = cv::Mat::zeros(size_, CV_8U);
-  const int border = Border(options_);
+  // The mask, of the half picture, keeps new corners away from the border and from points that are
+  // followed already.
+  const cv::Mat& half = previous_.pyramid.front();
+  cv::Mat mask = cv::Mat::zeros(half.size(), CV_8U);
+  const int border = (Border(options_) + 1) / 2;
   cv::rectangle(mask, cv::Point(border, border),
-                cv::Point(size_.width - 1 - border, size_.height - 1 - border), 255, cv::FILLED);
+                cv::Point((size_.width - 1) / 2 - border, (size_.height - 1) / 2 - border), 255,
+                cv::FILLED);
   for (const cv::Point2f& point : points_) {
-    cv::circle(mask, point, static_cast<int>(options_.min_distance_px), 0, cv::FILLED);
+    cv::circle(mask, point * kHalf, static_cast<int>(kHalf * options_.min_distance_px), 0,
+               cv::FILLED);
   }
 
   std::vector<cv::Rect> cells;  // that have less than their share
@@ -352,8 +356,8 @@ void KltTracker::AddCorners(const cv::Mat& gray) {
         continue;
       }
       rest = kRestOfBarrenCell;  // unless a corner is found
-      const cv::Point begin(column * size_.width / grid, row * size_.height / grid);
-      const cv::Point end((column + 1) * size_.width / grid, (row + 1) * size_.height / grid);
+      const cv::Point begin(column * half.cols / grid, row * half.rows / grid);
+      const cv::Point end((column + 1) * half.cols / grid, (row + 1) * half.rows / grid);
       cells.emplace_back(begin, end);
     }
   }
@@ -363,7 +367,8 @@ void KltTracker::AddCorners(const cv::Mat& gray) {
                           return cv::norm(point - corner) < options_.min_distance_px;
                         });
   };
-  for (const cv::Point2f& corner : Corners(gray, mask, cells, options_.min_quality)) {
+  for (const cv::Point2f& place : Corners(half, mask, cells, options_.min_quality)) {
+    const cv::Point2f corner = place * (1.0F / kHalf);
     if (static_cast<int>(points_.size()) >= options_.max_points) break;
     int& in_cell = count.at<int>(cell_of(corner));
     if (in_cell >= share || !far_from_new(corner)) continue;

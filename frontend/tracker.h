@@ -52,9 +52,9 @@ struct TrackerOptions {
 // frames later; 0.038 and 0.033 px, correlated by 0.2, with it. OpenCV's findTransformECC is as
 // good (0.046 and 0.040 px, both with patches of 21 px), but takes ten times the time.
 //
-// KLT itself works on pictures of half the size: first near where a point's own last motion leads
-// it, and only for what is lost there in the whole pyramid. It decides which points are found, and
-// nothing of where they are.
+// Corners are looked for at half the size, where KLT works, too: they decide which points are
+// followed, not where they are. KLT looks first near where a point's own last motion leads it, and
+// only for what is lost there in the whole pyramid.
 //
 // How the noise lies (TrackedPoint::noise_factor): the covariance of the alignment, over that of
 // the typical corner in the first pair of frames. Motion blur makes the noise along the motion up
@@ -104,7 +104,7 @@ class KltTracker {
                   const std::vector<cv::Point2f>& expected, Search* search) const;
   void FollowPoints(const Picture& picture, const PointPredictor& predictor);
   std::vector<Eigen::Vector3d> NoiseFactors(const std::vector<Eigen::Matrix2d>& covariances);
-  void AddCorners(const cv::Mat& gray);
+  void AddCorners();
 
   TrackerOptions options_;
   cv::Size size_;

@@ -146,23 +146,26 @@ TEST(KltTracker, SpreadsPointsAndKeepsTheirDistance) {
   for (const auto& [cell, count] : cells) EXPECT_LE(count, 2);
 }
 
-// In one cell for the whole picture, corners are those of OpenCV.
+// In one cell for the whole picture, corners are those that OpenCV finds at half its size.
 TEST(KltTracker, BeginsWithTheStrongestCorners) {
   TrackerOptions options = SmallImageOptions();
   options.grid = 1;
   const cv::Mat picture = Waves(3).Render(kWidth, kHeight, {0, 0});
   const auto points = KltTracker(options).Add(picture);
-  // Half of the patch that is aligned, and two pixels for its derivatives.
-  const int border = options.aligned_px / 2 + 2;
-  cv::Mat mask = cv::Mat::zeros(picture.size(), CV_8U);
-  mask(cv::Rect(border, border, kWidth - 2 * border, kHeight - 2 * border)) = 255;
+  cv::Mat half;
+  cv::pyrDown(picture, half);
+  // Half of the patch that is aligned, and two pixels for its derivatives, of the whole picture.
+  const int border = (options.aligned_px / 2 + 2 + 1) / 2;
+  cv::Mat mask = cv::Mat::zeros(half.size(), CV_8U);
+  const cv::Point last((kWidth - 1) / 2 - border, (kHeight - 1) / 2 - border);
+  mask(cv::Rect({border, border}, last + cv::Point(1, 1))) = 255;
   std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(picture, corners, options.max_points, options.min_quality,
-                          options.min_distance_px, mask);
+  cv::goodFeaturesToTrack(half, corners, options.max_points, options.min_quality,
+                          0.5 * options.min_distance_px, mask);
   ASSERT_GT(corners.size(), 50u);
   ASSERT_EQ(points.size(), corners.size());
   for (size_t i = 0; i < points.size(); ++i) {
-    EXPECT_EQ(points[i].px, Eigen::Vector2d(corners[i].x, corners[i].y)) << i;
+    EXPECT_EQ(points[i].px, Eigen::Vector2d(2.0 * corners[i].x, 2.0 * corners[i].y)) << i;
   }
 }
 
