@@ -33,23 +33,35 @@ constexpr double kDarkest = 0.02;
 // Decoded, but not yet tracked: the decoder has a few milliseconds more or less per picture.
 constexpr size_t kMostDecoded = 4;
 
+// Of the pictures that the summary keeps. Of a few frames in a row, one is the end of a pair.
+constexpr int kSmallWidthPx = 512;
+constexpr size_t kKeptPlaces = 4, kKeptInARow = 8;
+
+bool IsKept(size_t frame, size_t frames) {
+  for (size_t k = 0; k < kKeptPlaces; ++k) {
+    const size_t first = (2 * k + 1) * frames / (2 * kKeptPlaces);
+    if (frame >= first && frame < first + kKeptInARow) return true;
+  }
+  return false;
+}
+
 // A frame of the recording as its file has it.
 struct DecodedFrame {
-  Result<bool> more = false;  // false: there is none
-  cv::Mat gray;               // empty: not to be tracked
-  KltTracker::Picture prepared;
-  std::string complaint;  // about its size
+  Result<bool> more = false;     // false: there is none
+  KltTracker::Picture prepared;  // empty: not to be tracked
+  std::string complaint;         // about its size
   bool shows_nothing = false;
 };
 
 DecodedFrame DecodeNext(const KltTracker& tracker, FrameSource* source) {
   DecodedFrame frame;
-  frame.more = source->NextOfAnySize(&frame.gray, &frame.complaint);
-  if (frame.more && *frame.more && !frame.gray.empty() && ShowsNothing(frame.gray)) {
+  cv::Mat gray;
+  frame.more = source->NextOfAnySize(&gray, &frame.complaint);
+  if (frame.more && *frame.more && !gray.empty() && ShowsNothing(gray)) {
     frame.shows_nothing = true;
-    frame.gray.release();
+    gray.release();
   }
-  frame.prepared = tracker.Prepare(frame.gray);
+  frame.prepared = tracker.Prepare(std::move(gray));
   return frame;
 }
 
@@ -91,12 +103,19 @@ struct UnusableFrames {
   }
 };
 
-// The points of every frame, as the tracker has them. Errors of the files.
+// What all pictures give.
+struct Followed {
+  std::vector<std::vector<TrackedPoint>> tracks;  // the points of every frame
+  UnusableFrames unusable;
+  SmallPictures kept;
+};
+
+// Errors of the files.
 Status FollowCorners(const TrackerOptions& options, const Calibration* calibration,
                      const TrackingProgress& progress, const Recording& recording,
-                     FrameSource* source, std::vector<std::vector<TrackedPoint>>* tracks,
-                     UnusableFrames* unusable) {
+                     FrameSource* source, Followed* followed) {
   KltTracker tracker(options);
+  UnusableFrames& unusable = followed->unusable;
   MadeAhead<DecodedFrame> decoded(kMostDecoded,
                                   [&tracker, source] { return DecodeNext(tracker, source); });
   for (size_t i = 0; i < recording.frames.size(); ++i) {
@@ -104,16 +123,18 @@ Status FollowCorners(const TrackerOptions& options, const Calibration* calibrati
     if (!frame.more) return tl::unexpected(frame.more.error());
     if (!*frame.more) break;
     if (frame.shows_nothing) {
-      unusable->showing_nothing.push_back(static_cast<int>(i));
-    } else if (frame.gray.empty()) {
-      if (unusable->of_another_size.empty()) unusable->first_size = frame.complaint;
-      unusable->of_another_size.push_back(static_cast<int>(i));
+      unusable.showing_nothing.push_back(static_cast<int>(i));
+    } else if (frame.prepared.gray.empty()) {
+      if (unusable.of_another_size.empty()) unusable.first_size = frame.complaint;
+      unusable.of_another_size.push_back(static_cast<int>(i));
+    } else if (IsKept(i, recording.frames.size())) {
+      followed->kept[recording.frames[i].stamp_ns] = SmallPicture(frame.prepared.gray);
     }
     PointPredictor predictor;
     std::optional<GyroRotation> rotation;
     if (i > 0) rotation = RotationBetween(recording, calibration, i - 1);
     if (rotation) predictor = [&](const Eigen::Vector2d& px) { return rotation->Predict(px); };
-    tracks->push_back(tracker.Add(std::move(frame.prepared), predictor));
+    followed->tracks.push_back(tracker.Add(std::move(frame.prepared), predictor));
     if (progress)
       progress(static_cast<double>(i + 1) / static_cast<double>(recording.frames.size()));
   }
@@ -133,6 +154,13 @@ double CutTracksAtOutliers(const Calibration* calibration, Recording* recording)
 }
 
 }  // namespace
+
+cv::Mat SmallPicture(const cv::Mat& gray) {
+  const double scale = std::min(1.0, static_cast<double>(kSmallWidthPx) / gray.cols);
+  cv::Mat small;
+  cv::resize(gray, small, cv::Size(), scale, scale, cv::INTER_AREA);
+  return small;
+}
 
 bool ShowsNothing(const cv::Mat& gray) {
   cv::Mat blocks;
@@ -189,19 +217,20 @@ Result<TrackingSummary> TrackRecording(const TrackerOptions& options,
   const auto begin = std::chrono::steady_clock::now();
   Result<std::unique_ptr<FrameSource>> source = OpenFrames(*recording);
   if (!source) return tl::unexpected(source.error());
-  std::vector<std::vector<TrackedPoint>> tracks;
-  UnusableFrames unusable;
-  if (Status followed = FollowCorners(options, calibration, progress, *recording, source->get(),
-                                      &tracks, &unusable);
-      !followed) {
-    return tl::unexpected(followed.error());
+  Followed followed;
+  if (Status done =
+          FollowCorners(options, calibration, progress, *recording, source->get(), &followed);
+      !done) {
+    return tl::unexpected(done.error());
   }
-  recording->tracks = std::move(tracks);
+  recording->tracks = std::move(followed.tracks);
   recording->matches.clear();
   recording->match_noise = MatchNoise::kSecondImage;
-  if (Status left = unusable.LeaveOut(recording); !left) return tl::unexpected(left.error());
+  if (Status left = followed.unusable.LeaveOut(recording); !left)
+    return tl::unexpected(left.error());
 
   TrackingSummary summary;
+  summary.pictures = std::move(followed.kept);
   summary.outlier_ratio = CutTracksAtOutliers(calibration, recording);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (Status enough = CheckImageMotion(*recording); !enough) return tl::unexpected(enough.error());

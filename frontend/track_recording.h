@@ -2,7 +2,9 @@
 #ifndef CAMGYRO_FRONTEND_TRACK_RECORDING_H_
 #define CAMGYRO_FRONTEND_TRACK_RECORDING_H_
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -29,9 +31,16 @@ Status CheckImageMotion(const Recording& recording);
 // `gray`: 8-bit, one channel.
 bool ShowsNothing(const cv::Mat& gray);
 
+// Pictures for people to look at, by the stamps of their frames: 8-bit grey, scaled down.
+using SmallPictures = std::map<int64_t, cv::Mat>;
+cv::Mat SmallPicture(const cv::Mat& gray);  // at most 512 px wide
+
 struct TrackingSummary {
   double outlier_ratio = 0.0;  // share of matches taken for wrong
   double seconds = 0.0;
+  // A few frames in a row at 1/8, 3/8, 5/8 and 7/8 of the recording: to decode them once more, for
+  // the report, takes as long as all frames where the video has a single key picture.
+  SmallPictures pictures;
 };
 
 // Called with the done share 0..1.

@@ -145,16 +145,16 @@ int PyramidLevels(int window_px, double motion_px) {
 
 KltTracker::KltTracker(const TrackerOptions& options) : options_(options) {}
 
-KltTracker::Picture KltTracker::Prepare(const cv::Mat& gray) const {
+KltTracker::Picture KltTracker::Prepare(cv::Mat gray) const {
   if (gray.type() != CV_8UC1) return {};
   Picture picture;
-  picture.gray = gray.clone();  // the caller may use its memory again
   if (!gray.empty()) picture.pyramid = Pyramid(gray);
+  picture.gray = std::move(gray);
   return picture;
 }
 
 std::vector<TrackedPoint> KltTracker::Add(const cv::Mat& gray, const PointPredictor& predictor) {
-  return Add(Prepare(gray), predictor);
+  return Add(Prepare(gray.clone()), predictor);  // the caller may use its memory again
 }
 
 std::vector<TrackedPoint> KltTracker::Add(Picture picture, const PointPredictor& predictor) {

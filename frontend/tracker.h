@@ -78,12 +78,12 @@ class KltTracker {
   std::vector<TrackedPoint> Add(const cv::Mat& gray, const PointPredictor& predictor = nullptr);
 
   // What can be made of a picture before the one before it has been added: as in
-  // Add(Prepare(gray)), but from another thread.
+  // Add(Prepare(gray)), but from another thread. It shares the memory of `gray`.
   struct Picture {
     cv::Mat gray;
     std::vector<cv::Mat> pyramid;  // of its half and what is above, each with derivatives
   };
-  Picture Prepare(const cv::Mat& gray) const;
+  Picture Prepare(cv::Mat gray) const;
   std::vector<TrackedPoint> Add(Picture picture, const PointPredictor& predictor = nullptr);
 
  private:

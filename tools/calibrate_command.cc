@@ -97,7 +97,7 @@ Result<Calibrated> CalibrateOne(const std::string& path, const std::string& fold
   files.Add("calibration.yaml", yaml);
   const Command command = CalibrateCommand();
   const Result<std::string> html = CalibrationReportHtml(
-      *recording, *report,
+      *recording, tracking->pictures, *report,
       {CommandLineOf(command, {path}), DescribeRecording(*recording), FlagValues(command), yaml});
   if (!html) return tl::unexpected(html.error());
   files.Add("report.html", *html);

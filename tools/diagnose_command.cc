@@ -62,7 +62,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
     files.Add("calibration.yaml", yaml);
     const Command command = DiagnoseCommand();
     const Result<std::string> html =
-        DiagnosisReportHtml(*recording, diagnosis,
+        DiagnosisReportHtml(*recording, run->tracking.pictures, diagnosis,
                             {CommandLineOf(command, arguments), DescribeRecording(*recording),
                              FlagValues(command), yaml});
     if (!html) return tl::unexpected(html.error());

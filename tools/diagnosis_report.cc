@@ -146,10 +146,10 @@ ReportSection MapsSection(const Diagnosis& d) {
 
 }  // namespace
 
-Result<std::string> DiagnosisReportHtml(const Recording& recording, const Diagnosis& diagnosis,
-                                        const RunInfo& run) {
+Result<std::string> DiagnosisReportHtml(const Recording& recording, const SmallPictures& pictures,
+                                        const Diagnosis& diagnosis, const RunInfo& run) {
   Result<std::vector<ReportSection>> sections =
-      CalibrationSections(recording, diagnosis.result(), run);
+      CalibrationSections(recording, pictures, diagnosis.result(), run);
   if (!sections) return tl::unexpected(sections.error());
   sections->insert(sections->begin(), VerdictSection(diagnosis, recording.HasOnlyAttitudes()));
   if (!diagnosis.maps_after.empty()) {

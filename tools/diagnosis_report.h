@@ -7,14 +7,16 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/diagnosis/diagnose.h"
+#include "frontend/track_recording.h"
 #include "tools/report/calibration_sections.h"
 
 namespace camgyro {
 
 // The verdict, the rounds, what is left before and after the effects, then the sections of the
-// calibration's report. The diagnosis must have a calibration. Errors: of decoding pictures.
-Result<std::string> DiagnosisReportHtml(const Recording& recording, const Diagnosis& diagnosis,
-                                        const RunInfo& run);
+// calibration's report. The diagnosis must have a calibration. `pictures` and errors:
+// as CalibrationSections.
+Result<std::string> DiagnosisReportHtml(const Recording& recording, const SmallPictures& pictures,
+                                        const Diagnosis& diagnosis, const RunInfo& run);
 
 }  // namespace camgyro
 

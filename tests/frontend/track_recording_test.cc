@@ -34,6 +34,12 @@ cv::Mat Scene(int frame) {
   return wide(cv::Rect(3 * frame, 0, 240, 180)).clone();
 }
 
+cv::Mat Enlarged(const cv::Mat& picture) {
+  cv::Mat enlarged;
+  cv::resize(picture, enlarged, {}, 4.0, 4.0);
+  return enlarged;
+}
+
 // What the sensor gives in the dark, with its gain at the limit.
 cv::Mat Dark() { return Noise(240, 180, 18.0, 16.0); }
 
@@ -64,6 +70,24 @@ TEST(ShowsNothing, KnowsTheDarkFromAScene) {
   cv::Mat dim;  // a scene at dusk
   Scene(0).convertTo(dim, CV_8UC1, 0.2, 10.0);
   EXPECT_FALSE(ShowsNothing(dim));
+}
+
+TEST(TrackRecording, KeepsPicturesOfAFewFramesForPeople) {
+  const RecordingFolder folder;
+  auto recording = Pictures(folder, [](int i, cv::Mat* picture) {
+    if (i == 5) *picture = cv::Scalar(18.0);  // a lens cap
+    *picture = Enlarged(*picture);
+  });
+  ASSERT_TRUE(recording) << recording.error().message;
+  const auto summary = TrackRecording({}, nullptr, nullptr, &*recording);
+  ASSERT_TRUE(summary) << summary.error().message;
+  // Of 12 frames, all from 1/8 on are within a few of a place that is kept.
+  EXPECT_EQ(summary->pictures.size(), 10U);
+  for (const auto& [stamp_ns, picture] : summary->pictures) {
+    EXPECT_EQ(picture.size(), cv::Size(512, 384));
+    const auto frame = static_cast<int>((stamp_ns - 1'000'000'000) / kInterval);
+    EXPECT_LT(cv::norm(picture, SmallPicture(Enlarged(Scene(frame))), cv::NORM_INF), 1.5);
+  }
 }
 
 TEST(TrackRecording, LeavesOutPicturesThatShowNothing) {

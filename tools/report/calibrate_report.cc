@@ -33,6 +33,7 @@ std::vector<TimedPair> EvenlyChosen(std::vector<TimedPair> pairs) {
 }  // namespace
 
 Result<std::vector<ReportSection>> CalibrationSections(const Recording& recording,
+                                                       const SmallPictures& pictures,
                                                        const CalibrationReport& report,
                                                        const RunInfo& run) {
   const bool attitudes = recording.HasOnlyAttitudes();
@@ -56,7 +57,7 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
     const std::array<std::function<void()>, 3> parts = {
         [&] {
           fits[1].residuals = ComputeResiduals(input, pairs, calibration, noise_px, options);
-          matches = MatchesSection(recording, fits[1].residuals);
+          matches = MatchesSection(recording, pictures, fits[1].residuals);
         },
         make_rates,
         [&] {
@@ -80,9 +81,10 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
   return sections;
 }
 
-Result<std::string> CalibrationReportHtml(const Recording& recording,
+Result<std::string> CalibrationReportHtml(const Recording& recording, const SmallPictures& pictures,
                                           const CalibrationReport& report, const RunInfo& run) {
-  const Result<std::vector<ReportSection>> sections = CalibrationSections(recording, report, run);
+  const Result<std::vector<ReportSection>> sections =
+      CalibrationSections(recording, pictures, report, run);
   if (!sections) return tl::unexpected(sections.error());
   return ReportPage("Calibration of " + recording.path, run.recording, *sections);
 }

@@ -7,6 +7,7 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/calibrate.h"
+#include "frontend/track_recording.h"
 #include "tools/report/calibration_sections.h"
 #include "tools/report/page.h"
 
@@ -14,13 +15,14 @@ namespace camgyro {
 
 // All sections, in their order: result, motion, convergence, delay, rates, residuals at the start
 // and now, fit, matches, reproduction. Recordings of attitudes have no residuals and matches.
-// Errors: of decoding pictures.
+// `pictures`: what tracking has kept (MatchesSection). Errors: of decoding others.
 Result<std::vector<ReportSection>> CalibrationSections(const Recording& recording,
+                                                       const SmallPictures& pictures,
                                                        const CalibrationReport& report,
                                                        const RunInfo& run);
 
 // The page with these sections.
-Result<std::string> CalibrationReportHtml(const Recording& recording,
+Result<std::string> CalibrationReportHtml(const Recording& recording, const SmallPictures& pictures,
                                           const CalibrationReport& report, const RunInfo& run);
 
 }  // namespace camgyro

@@ -4,10 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "core/format.h"
 #include "core/so3.h"
@@ -26,8 +24,11 @@ constexpr double kDegrees = 57.29577951308232;
 constexpr size_t kMaxGyroPoints = 12000;  // of a chart; beyond, every n-th sample
 constexpr size_t kMaxCameraPoints = 600;
 constexpr size_t kShownPairs = 4;
-constexpr int kMaxPictureWidth = 512;
 constexpr int kJpegQuality = 60;
+
+int64_t StampOf(const Recording& recording, int frame) {
+  return recording.frames[static_cast<size_t>(frame)].stamp_ns;
+}
 
 struct RatePoint {
   double time_s = 0.0;  // gyro clock, from the first frame's exposure
@@ -87,9 +88,7 @@ std::vector<RatePoint> RatePoints(const Recording& recording, const Calibration&
     points.push_back(point);
   }
   for (const CameraRotation& rotation : RotationsOfNeighbours(recording, calibration)) {
-    const auto stamp = [&](int frame) {
-      return SecondsSince(first_ns, recording.frames[static_cast<size_t>(frame)].stamp_ns);
-    };
+    const auto stamp = [&](int frame) { return SecondsSince(first_ns, StampOf(recording, frame)); };
     const double a_s = stamp(rotation.frame_a), b_s = stamp(rotation.frame_b);
     RatePoint point;
     point.time_s = 0.5 * (a_s + b_s);
@@ -101,10 +100,17 @@ std::vector<RatePoint> RatePoints(const Recording& recording, const Calibration&
   return points;
 }
 
-// Pictures of some frames (ascending indices), scaled down and as jpeg.
-Result<std::map<int, std::vector<unsigned char>>> Pictures(const Recording& recording,
-                                                           const std::vector<int>& frames) {
-  std::map<int, std::vector<unsigned char>> pictures;
+// The number of some (ascending, not empty) that is nearest to `wanted`.
+size_t Nearest(const std::vector<size_t>& some, size_t wanted) {
+  const auto at = std::lower_bound(some.begin(), some.end(), wanted);
+  if (at == some.begin()) return *at;
+  if (at == some.end() || wanted - *(at - 1) <= *at - wanted) return *(at - 1);
+  return *at;
+}
+
+// Of some frames (ascending indices).
+Result<SmallPictures> DecodePictures(const Recording& recording, const std::vector<int>& frames) {
+  SmallPictures pictures;
   if (!recording.HasImages() || frames.empty()) return pictures;
   Result<std::unique_ptr<FrameSource>> source = OpenFrames(recording);
   if (!source) return tl::unexpected(source.error());
@@ -116,12 +122,17 @@ Result<std::map<int, std::vector<unsigned char>>> Pictures(const Recording& reco
     const Result<bool> read = (*source)->Next(&gray);
     if (!read) return tl::unexpected(read.error());
     if (!*read) break;
-    const double scale = std::min(1.0, static_cast<double>(kMaxPictureWidth) / gray.cols);
-    cv::Mat small;
-    cv::resize(gray, small, cv::Size(), scale, scale, cv::INTER_AREA);
-    cv::imencode(".jpg", small, pictures[frame], {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+    pictures[StampOf(recording, frame)] = SmallPicture(gray);
   }
   return pictures;
+}
+
+std::vector<unsigned char> Jpeg(const SmallPictures& pictures, int64_t stamp_ns) {
+  std::vector<unsigned char> jpeg;
+  if (const auto found = pictures.find(stamp_ns); found != pictures.end()) {
+    cv::imencode(".jpg", found->second, jpeg, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  }
+  return jpeg;
 }
 
 }  // namespace
@@ -154,7 +165,7 @@ ReportSection RatesSection(const Recording& recording, const Calibration& calibr
   return {"rates", "Gyro and camera, synchronised", html};
 }
 
-Result<ReportSection> MatchesSection(const Recording& recording,
+Result<ReportSection> MatchesSection(const Recording& recording, const SmallPictures& pictures,
                                      const std::vector<MatchResidual>& residuals) {
   ReportSection section{"matches", "Matched features", ""};
   std::vector<std::pair<int, int>> pairs;  // begin of each pair's rows, and its second frame
@@ -167,15 +178,21 @@ Result<ReportSection> MatchesSection(const Recording& recording,
     section.html = Paragraph("This recording has no matched features.");
     return section;
   }
+  std::vector<size_t> with_picture;
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    if (pictures.count(StampOf(recording, pairs[i].second)) > 0) with_picture.push_back(i);
+  }
   std::vector<size_t> shown;
   for (size_t k = 0; k < kShownPairs; ++k) {
-    const size_t index = (2 * k + 1) * pairs.size() / (2 * kShownPairs);
+    size_t index = (2 * k + 1) * pairs.size() / (2 * kShownPairs);
+    if (!with_picture.empty()) index = Nearest(with_picture, index);
     if (shown.empty() || shown.back() != index) shown.push_back(index);
   }
   std::vector<int> frames;
   for (const size_t index : shown) frames.push_back(pairs[index].second);
-  Result<std::map<int, std::vector<unsigned char>>> pictures = Pictures(recording, frames);
-  if (!pictures) return tl::unexpected(pictures.error());
+  const Result<SmallPictures> drawn =
+      with_picture.empty() ? DecodePictures(recording, frames) : pictures;
+  if (!drawn) return tl::unexpected(drawn.error());
   section.html =
       Paragraph(
           "Lines: from where a feature was in the frame before. Circles: inliers; crosses: "
@@ -191,16 +208,15 @@ Result<ReportSection> MatchesSection(const Recording& recording,
       matches.push_back({residuals[i].match.px_a, residuals[i].match.px_b, residuals[i].inlier});
       outliers += residuals[i].inlier ? 0 : 1;
     }
-    const double time_s =
-        SecondsSince(recording.frames.front().stamp_ns,
-                     recording.frames[static_cast<size_t>(pairs[index].second)].stamp_ns);
+    const int64_t stamp_ns = StampOf(recording, pairs[index].second);
+    const double time_s = SecondsSince(recording.frames.front().stamp_ns, stamp_ns);
     section.html +=
         "<div>" +
         MatchesHtml(Format("matches-%d", pairs[index].second),
                     Format("Frame %d, at %.2f s: %zu inliers, %zu outliers", pairs[index].second,
                            time_s, matches.size() - outliers, outliers),
-                    recording.camera.width_px, recording.camera.height_px,
-                    (*pictures)[pairs[index].second], matches) +
+                    recording.camera.width_px, recording.camera.height_px, Jpeg(*drawn, stamp_ns),
+                    matches) +
         "</div>";
   }
   section.html += "</div>\n";

@@ -8,6 +8,7 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/residual_table.h"
+#include "frontend/track_recording.h"
 #include "tools/report/page.h"
 
 namespace camgyro {
@@ -19,8 +20,9 @@ ReportSection RatesSection(const Recording& recording, const Calibration& calibr
 
 // Matched features of four pairs spread over the recording, inliers and outliers, over their
 // pictures where the recording has any. `residuals`: in the order of pairs (ComputeResiduals).
+// Pairs that end at a frame of `pictures` are chosen; without such a pair, pictures are decoded.
 // Errors: of decoding.
-Result<ReportSection> MatchesSection(const Recording& recording,
+Result<ReportSection> MatchesSection(const Recording& recording, const SmallPictures& pictures,
                                      const std::vector<MatchResidual>& residuals);
 
 }  // namespace camgyro

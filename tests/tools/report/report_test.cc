@@ -197,12 +197,32 @@ TEST(Report, MatchesLieOnTheirPictures) {
     r.inlier = &r != &residuals[1];
   }
   residuals[2].frame_b = 9;
-  const Result<ReportSection> section = MatchesSection(*recording, residuals);
+  const Result<ReportSection> section = MatchesSection(*recording, {}, residuals);
   ASSERT_TRUE(section) << section.error().message;
   EXPECT_EQ(Count(section->html, "href=\"data:image/jpeg;base64,/9j/"), 2);  // a JPEG's first bytes
   EXPECT_EQ(Count(section->html, "class=\"inlier\""), 2);
   EXPECT_EQ(Count(section->html, "class=\"outlier\""), 1);
   EXPECT_THAT(section->html, HasSubstr("Frame 3, at 0.10 s: 1 inliers, 1 outliers"));
+}
+
+TEST(Report, MatchesAreShownWhereTrackingKeptPictures) {
+  Recording recording;
+  recording.video_file = "absent.mp4";  // nothing is decoded
+  std::vector<MatchResidual> residuals(100);
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    recording.frames.emplace_back().stamp_ns = static_cast<int64_t>(i) * 100000000;
+    residuals[i].frame_b = static_cast<int>(i);
+  }
+  SmallPictures pictures;
+  for (const size_t frame : {3, 40, 90}) {
+    pictures[recording.frames[frame].stamp_ns] = cv::Mat::zeros(4, 4, CV_8UC1);
+  }
+  const Result<ReportSection> section = MatchesSection(recording, pictures, residuals);
+  ASSERT_TRUE(section) << section.error().message;
+  EXPECT_EQ(Count(section->html, "href=\"data:image/jpeg;base64,/9j/"), 3);
+  for (const char* frame : {"Frame 3,", "Frame 40,", "Frame 90,"}) {
+    EXPECT_THAT(section->html, HasSubstr(frame));
+  }
 }
 
 }  // namespace
