@@ -12,6 +12,7 @@
 
 #include "estimator/window/marginalize.h"
 #include "estimator/window/normal_equations.h"
+#include "estimator/window/prepare_kept_costs.h"
 #include "factors/marginal_prior.h"
 #include "factors/rotation_manifold.h"
 
@@ -66,11 +67,12 @@ void AddWalk(const FactorGraph::Walk& walk, const std::map<BlockId, Eigen::Index
 
 }  // namespace
 
-FactorGraph::FactorGraph() {
+FactorGraph::FactorGraph() : prepare_(std::make_unique<PrepareKeptCosts>()) {
   ceres::Problem::Options options;
   options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   options.enable_fast_removal = true;
+  options.evaluation_callback = prepare_.get();
   problem_ = std::make_unique<ceres::Problem>(options);
 }
 
@@ -91,6 +93,7 @@ FactorGraph& FactorGraph::operator=(FactorGraph other) noexcept {
   std::swap(factors_, other.factors_);
   std::swap(next_key_, other.next_key_);
   std::swap(subsets_, other.subsets_);
+  std::swap(prepare_, other.prepare_);
   std::swap(problem_, other.problem_);
   return *this;
 }

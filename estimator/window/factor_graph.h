@@ -27,6 +27,8 @@ class ResidualBlock;
 
 namespace camgyro {
 
+class PrepareKeptCosts;
+
 // What a block is. The covariance eliminates from the last kind and index to the first.
 enum class BlockKind {
   kLens,
@@ -135,7 +137,8 @@ class FactorGraph {
   const std::map<BlockId, Block>& blocks() const { return blocks_; }
   const std::map<FactorKey, Factor>& factors() const { return factors_; }
 
-  // Levenberg-Marquardt on all factors (one thread: repeatable).
+  // Levenberg-Marquardt on all factors. Factors whose cost is a KeptCost are evaluated in as many
+  // threads as are free, and Ceres sums them up in one: the result does not depend on the threads.
   SolveReport Solve(const SolveOptions& options);
 
   // Linear functionals of the state with their covariance. Row i of a functional is the sum over
@@ -186,6 +189,7 @@ class FactorGraph {
   std::map<FactorKey, Factor> factors_;
   FactorKey next_key_ = 0;
   std::map<BlockId, std::shared_ptr<ceres::Manifold>> subsets_;  // of blocks partly constant
+  std::unique_ptr<PrepareKeptCosts> prepare_;                    // the problem has its address
   std::unique_ptr<ceres::Problem> problem_;
 };
 

@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "estimator/window/factor_graph.h"
+#include "estimator/window/kept_cost.h"
+#include "estimator/window/prepare_kept_costs.h"
 
 namespace camgyro {
 namespace {
@@ -49,6 +51,13 @@ ceres::Solver::Options CeresOptions(const SolveOptions& options) {
 }  // namespace
 
 SolveReport FactorGraph::Solve(const SolveOptions& options) {
+  for (const auto& [key, factor] : factors_) {
+    const auto* kept = dynamic_cast<const KeptCost*>(factor.cost.get());
+    if (kept == nullptr) continue;
+    std::vector<const double*> parameters;
+    for (const BlockId& id : factor.blocks) parameters.push_back(value(id).data());
+    prepare_->Add(kept, std::move(parameters));
+  }
   ceres::Solver::Options ceres_options = CeresOptions(options);
   if (std::isfinite(options.cost_tolerance)) {
     double cost = 0.0;
@@ -62,6 +71,7 @@ SolveReport FactorGraph::Solve(const SolveOptions& options) {
   ceres_options.callbacks.push_back(&stop);
   ceres::Solver::Summary summary;
   ceres::Solve(ceres_options, problem_.get(), &summary);
+  prepare_->Clear();
   SolveReport report;
   report.usable = summary.IsSolutionUsable();
   report.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);

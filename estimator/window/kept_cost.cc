@@ -15,7 +15,7 @@ KeptCost::KeptCost(std::shared_ptr<const ceres::CostFunction> cost, KeepBounds b
 
 bool KeptCost::Evaluate(double const* const* parameters, double* residuals,
                         double** jacobians) const {
-  if (!Holds(parameters) && !Linearise(parameters)) return false;
+  if (!Prepare(parameters)) return false;
   Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = residuals_ + change_;
   const double* by_block = by_blocks_.data();
   for (size_t i = 0; jacobians != nullptr && i < parameter_block_sizes().size(); ++i) {
@@ -24,6 +24,10 @@ bool KeptCost::Evaluate(double const* const* parameters, double* residuals,
     by_block = end;
   }
   return true;
+}
+
+bool KeptCost::Prepare(double const* const* parameters) const {
+  return Holds(parameters) || Linearise(parameters);
 }
 
 bool KeptCost::Holds(double const* const* parameters) const {

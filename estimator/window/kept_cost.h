@@ -29,13 +29,16 @@ struct KeepBounds {
 // than the bounds allow; nearer, it is r0 + J d, with d the change of the parameters as they are
 // stored. A pair of a sliding window is solved again and again with parameters that hardly move.
 //
-// Takes as much memory as the Jacobian. Not thread-safe.
+// Takes as much memory as the Jacobian. Not thread-safe: each object is for one thread at a time.
 class KeptCost final : public ceres::CostFunction {
  public:
   KeptCost(std::shared_ptr<const ceres::CostFunction> cost, KeepBounds bounds);
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
+
+  // Evaluates the other cost function now, if Evaluate would have to. Returns what that would.
+  bool Prepare(double const* const* parameters) const;
 
   // What the function depends on besides its parameters has changed.
   void Forget() { known_ = false; }

@@ -29,7 +29,7 @@ struct PairGraphOptions {
   bool drop_without_ray = false;
   // Each pair keeps its linearisation while its residuals change by less than this, root mean
   // square (KeptCost): for few pairs that are solved again and again. 0: while nothing changes.
-  // Negative: not at all.
+  // Negative: not at all. A refinement chooses by itself.
   double keep_within_sigmas = -1.0;
   // White noise of one gyro sample per axis (Jia & Evans section V.C); see GyroSigma.
   Eigen::Vector3d gyro_sigma_rad_s = Eigen::Vector3d::Constant(0.003);

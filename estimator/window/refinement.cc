@@ -106,6 +106,22 @@ constexpr double kRoughly = 1e-4;
 
 constexpr int kLeastPairs = 10;
 
+// Linearisations are kept while nothing changes, from a step that is tried to its derivatives and
+// from the last step to the covariance, unless they are larger than this: those of some minutes of
+// recording. Longer ones need their memory for Ceres' copies of them.
+constexpr double kMostKeptBytes = 128e6;
+
+double KeptBytes(const std::vector<TimedPair>& pairs, const PairGraphOptions& options) {
+  double bytes = 0.0;
+  for (const TimedPair& pair : pairs) {
+    // Lens, shutter, mounting, direction, bend; rates at both ends and a few for the readout.
+    const double rates = 4.0 + (pair.time_b_s - pair.time_a_s) / options.rate_step_s;
+    const double columns = kLensSize + kShutterSize + 4 + 3 + 6 + 3.0 * rates;
+    bytes += sizeof(double) * columns * static_cast<double>(pair.matches.size());
+  }
+  return bytes;
+}
+
 // Noise scale, directions and solve in turns.
 class Refinement {
  public:
@@ -178,6 +194,8 @@ class Refinement {
     for (const TimedPair& pair : pairs_) factors[pair.id] = pair.noise_factor;
     for (size_t i = 0; i < ids_.size(); ++i) factors[ids_[i]] = noise_now_.factors[i];
     graph_options_.sigma = noise_now_.scale;
+    graph_options_.keep_within_sigmas =
+        KeptBytes(pairs_, graph_options_) <= kMostKeptBytes ? 0.0 : -1.0;
     built_at_ = result_.calibration;
     graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_,
                                          result_.rounds == 1 ? options_.latents : nullptr);

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
 #include <vector>
 
+#include "core/parallel.h"
 #include "core/so3.h"
 #include "estimator/window/factor_graph.h"
 #include "estimator/window/pair_graph.h"
@@ -183,17 +185,40 @@ TEST(FactorGraphSolve, FindsTheMinimumOfAWindow) {
   ExpectSolvedToTheMinimum(problem, 1e-4, 0.05);
 }
 
-TEST(FactorGraphSolve, FindsTheMinimumOfARefinement) {
+// All pairs of 1.5 s, some 40.
+PairGraph RefinedGraph(const PairGraphOptions& options) {
   const simulation::Simulated s = simulation::SimulateTracks(ShortScenario(1.5)).value();
   const EstimationInput input = MakeEstimationInput(s.recording);
-  const Prior prior = StartOffTheTruth(s.truth);
-  PairGraphOptions options;
-  options.sigma = 0.7;
-  PairGraph graph(s.truth, prior, options);
+  PairGraph graph(s.truth, StartOffTheTruth(s.truth), options);
   for (const TimedRate& rate : input.rates) graph.AddRate(rate);
   for (const TimedPair& pair : input.pairs) graph.AddPair(pair);
+  return graph;
+}
+
+TEST(FactorGraphSolve, FindsTheMinimumOfARefinement) {
+  PairGraphOptions options;
+  options.sigma = 0.7;
+  const PairGraph graph = RefinedGraph(options);
   ASSERT_GT(graph.num_pairs(), 40);
   ExpectSolvedToTheMinimum(graph.graph(), 1e-8, 1e-3);
+}
+
+// Pairs that keep their linearisation while nothing changes are evaluated by any number of threads.
+TEST(FactorGraphSolve, TheSameBytesWhoeverEvaluates) {
+  const int most_threads = MostThreads();
+  std::vector<std::vector<VectorXd>> solutions;
+  for (const int threads : {0, 1, 2, 3}) {
+    LimitThreads(std::max(1, threads));
+    PairGraphOptions options;
+    options.sigma = 0.7;
+    options.keep_within_sigmas = threads == 0 ? -1.0 : 0.0;
+    PairGraph graph = RefinedGraph(options);
+    ASSERT_TRUE(graph.Solve({10, 1e-10}).usable);
+    solutions.emplace_back();
+    for (const auto& entry : graph.graph().blocks()) solutions.back().push_back(entry.second.value);
+  }
+  LimitThreads(most_threads);
+  for (const auto& solution : solutions) EXPECT_EQ(solution, solutions.front());
 }
 
 }  // namespace

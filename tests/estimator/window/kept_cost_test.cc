@@ -76,6 +76,19 @@ TEST_F(KeptCostTest, GivesTheSameAgainWithoutAnEvaluation) {
   EXPECT_EQ(second.by_y, (std::array<double, 2>{2.0, 6.0}));
 }
 
+TEST_F(KeptCostTest, IsPreparedBeforeItIsAsked) {
+  const double* parameters[] = {x_.data(), &y_};
+  ASSERT_TRUE(kept_.Prepare(parameters));
+  ASSERT_TRUE(kept_.Prepare(parameters));
+  Value value;
+  ASSERT_TRUE(Evaluate(true, true, &value));
+  EXPECT_EQ(inner_->count, 1);
+  EXPECT_EQ(value.residuals, (std::array<double, 2>{7.0, 9.0}));
+  y_ = -1.0;
+  EXPECT_FALSE(kept_.Prepare(parameters));
+  EXPECT_FALSE(Evaluate(true, true, &value));
+}
+
 TEST_F(KeptCostTest, EvaluatesWhatIsNew) {
   Value result;
   EXPECT_EQ(kept_.number(), 0);
