@@ -314,7 +314,7 @@ TEST_F(CommandsTest, CalibrateMeasuredLensFromTheStart) {
   const auto recording = MeasuredData("euroc-v101-flight");
   if (!recording) GTEST_SKIP() << "*** SKIPPED: no measured recording euroc-v101-flight";
   const RunResult run = Run("calibrate " + *recording +
-                            " --effects=radial_distortion:radtan --focal_px=250 --out=result");
+                            " --effects=radial_distortion:radtan --focal_px=290 --out=result");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out + run.err, HasSubstr("the online estimate leads nowhere"));
   EXPECT_THAT(run.out, testing::Not(HasSubstr("online pass and refinement differ")));

@@ -168,11 +168,11 @@ TEST(SlidingWindow, TwoRunsAreBitIdenticalAndMemoryIsBounded) {
     EXPECT_EQ(window.graph().num_pairs(), SlidingWindowOptions().window_pairs);
   }
   ASSERT_GT(blocks.size(), 100u);
-  // After the first settled update the window shrinks to its 10 pairs. Each holds two blocks of
+  // After the first settled update the window shrinks to its 6 pairs. Each holds two blocks of
   // its own and a rate group; on top three global blocks, the last rates, two or three biases.
   for (size_t i = 1; i < blocks.size(); ++i) {
-    ASSERT_LE(blocks[i], 3u * 11u + 3u + 2u + 3u) << i;
-    ASSERT_LE(factors[i], 3u * 11u + 2u + 1u + 4u) << i;
+    ASSERT_LE(blocks[i], 3u * 7u + 3u + 2u + 3u) << i;
+    ASSERT_LE(factors[i], 3u * 7u + 2u + 1u + 4u) << i;
   }
   const auto early = *std::max_element(blocks.begin() + 1, blocks.begin() + 61);
   const auto late = *std::max_element(blocks.end() - 60, blocks.end());
@@ -215,7 +215,7 @@ TEST(SlidingWindowMemory, DoesNotGrowWithTheLengthOfTheRecording) {
     heap_bytes.push_back(mallinfo2().uordblks);
   }
   EXPECT_GT(window.num_used_pairs(), 1700);
-  // A window of 10 pairs may happen to hold more matches or rates at that moment. The samples alone
+  // A window of 6 pairs may happen to hold more matches or rates at that moment. The samples alone
   // of the eight passes between would be 400 kB.
   EXPECT_LT(heap_bytes.back(), heap_bytes[1] + 40'000);
 }
