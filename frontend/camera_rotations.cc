@@ -26,14 +26,6 @@ constexpr size_t kSearchEvery = 5;
 
 constexpr size_t kMatchesOfScan = 60;
 
-FramePair Thinned(const FramePair& pair, size_t most) {
-  FramePair thinned{pair.frame_a, pair.frame_b, {}};
-  for (const size_t i : SpreadIndices(pair.matches.size(), most)) {
-    thinned.matches.push_back(pair.matches[i]);
-  }
-  return thinned;
-}
-
 // The recording's declared lens, with this focal length.
 Calibration DeclaredCamera(const CameraGuess& camera, double focal_px) {
   const Eigen::Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
@@ -91,6 +83,14 @@ std::vector<size_t> SpreadIndices(size_t count, size_t most) {
     spread[i] = count <= most ? i : i * count / most;
   }
   return spread;
+}
+
+FramePair Thinned(const FramePair& pair, size_t most) {
+  FramePair thinned{pair.frame_a, pair.frame_b, {}};
+  for (const size_t i : SpreadIndices(pair.matches.size(), most)) {
+    thinned.matches.push_back(pair.matches[i]);
+  }
+  return thinned;
 }
 
 std::vector<std::vector<CameraRotation>> CameraRotationsOf(

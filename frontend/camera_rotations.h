@@ -27,6 +27,9 @@ std::vector<FramePair> PairsForRotations(const Recording& recording,
 // At most `most` of the numbers below `count`, evenly spread.
 std::vector<size_t> SpreadIndices(size_t count, size_t most);
 
+// A pair with at most `most` of its matches, evenly spread.
+FramePair Thinned(const FramePair& pair, size_t most);
+
 // EstimateCameraRotation (two_view_rotation.h) of each pair in each trial, with the recording's
 // declared lens (the centre of the picture where it declares no principal point), for every trial
 // those pairs whose rotation can be found. Trials some per cent of the focal length apart, one

@@ -26,6 +26,8 @@ constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KL
 // corner.
 constexpr double kLeastVariance = 0.05;
 constexpr size_t kPointsForReference = 20;
+// A line through more grey values is no better, and takes longer than to align the patches.
+constexpr size_t kPointsOfExposure = 50;
 // Frames for which a cell is left alone when no corner has been found in it: where there is nothing
 // to be found (a wall, the sky) a cell would be searched in every frame.
 constexpr int kRestOfBarrenCell = 2;
@@ -62,6 +64,10 @@ std::optional<cv::Mat> LikePrevious(const cv::Mat& gray, const std::vector<cv::M
     if (found[i]) greys.emplace_back(at(current, to[i]), at(previous, from[i]));
   }
   if (greys.size() < 20) return std::nullopt;
+  if (const size_t step = greys.size() / kPointsOfExposure; step > 1) {
+    for (size_t i = 0; i * step < greys.size(); ++i) greys[i] = greys[i * step];
+    greys.resize((greys.size() + step - 1) / step);
+  }
   cv::Vec4f line;  // direction, point
   cv::fitLine(greys, line, cv::DIST_HUBER, 0, 0.01, 0.01);
   const double gain = line[1] / line[0];

@@ -23,6 +23,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegrees = 57.29577951308232;
 constexpr size_t kMaxGyroPoints = 12000;  // of a chart; beyond, every n-th sample
 constexpr size_t kMaxCameraPoints = 600;
+constexpr size_t kMaxMatchesOfAPoint = 100;  // what more would tell is not seen in a chart
 constexpr size_t kShownPairs = 4;
 constexpr int kJpegQuality = 60;
 
@@ -52,7 +53,8 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
   std::vector<FramePair> pairs;
   for (const size_t i : SpreadIndices(neighbours.size(), kMaxCameraPoints)) {
     const TimedPair& pair = neighbours[i];
-    pairs.push_back({pair.frame_a, pair.frame_b, MatchesOf(recording, pair)});
+    pairs.push_back(
+        Thinned({pair.frame_a, pair.frame_b, MatchesOf(recording, pair)}, kMaxMatchesOfAPoint));
   }
   Recording shown;
   shown.camera = recording.camera;
