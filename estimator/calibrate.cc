@@ -93,12 +93,11 @@ class CalibrationJob {
     MarkDetermined(attitudes_, report_.prior, &report_.calibration);
     // Delay and bias come from rates; the rest needs a fit that has settled, at a lens like the
     // start's.
-    if (!report_.converged ||
-        IsFarFromRotations(report_.calibration.lens[kFocal], report_.start.focal)) {
-      for (size_t i = 0; i < kStateSize; ++i) {
-        if (StateTable()[i].needs_fit) report_.calibration.determined[i] = false;
-      }
-    }
+    const double focal_px = report_.calibration.lens[kFocal];
+    const bool is_far = IsFarFromRotations(focal_px, report_.start.focal) ||
+                        (!report_.calibration.determined[kStateFocal] &&
+                         RanAway(focal_px, from_start_.lens[kFocal]));
+    if (is_far || !report_.converged) DisbelieveFit(is_far, &report_);
     AddDoubts(recording_, &report_);
     Tell("refinement", 1.0);
     return std::move(report_);

@@ -20,23 +20,44 @@ bool FocalRanAway(bool attitudes, const Calibration& c) {
                          c.lens[kFocal] < kLongestFocal * diagonal_px);
 }
 
+// The data shrank the prior, and the result is of practical use.
+bool IsUseful(size_t i, const Prior& prior, const Calibration& c) {
+  StateScales scales;
+  scales.focal_px = c.lens[kFocal];
+  scales.width_px = c.width_px;
+  const double sigma = c.sigma()[static_cast<Eigen::Index>(i)];
+  return sigma < StateTable()[i].useful_sigma.In(scales) &&
+         sigma < 0.5 * prior.sigma[static_cast<Eigen::Index>(i)];
+}
+
 }  // namespace
 
 void MarkDetermined(bool attitudes, const Prior& prior, Calibration* c) {
-  StateScales scales;
-  scales.focal_px = c->lens[kFocal];
-  scales.width_px = c->width_px;
-  const StateVector sigma = c->sigma();
-  for (int i = 0; i < kStateSize; ++i) {
-    const StateParameter& parameter = StateTable()[static_cast<size_t>(i)];
-    c->determined[static_cast<size_t>(i)] = !(attitudes && parameter.needs_pixels) &&
-                                            sigma[i] < parameter.useful_sigma.In(scales) &&
-                                            sigma[i] < 0.5 * prior.sigma[i];
+  for (size_t i = 0; i < kStateSize; ++i) {
+    c->determined[i] = !(attitudes && StateTable()[i].needs_pixels) && IsUseful(i, prior, *c);
   }
   // What such a fit says of anything, the delay included, has no known error.
   if (FocalRanAway(attitudes, *c)) c->determined.fill(false);
   // Rows are timed by the angles between them: without a focal length there are none.
   if (!c->determined[kStateFocal]) c->determined[kStateReadout] = false;
+}
+
+void DisbelieveFit(bool is_far, CalibrationReport* report) {
+  Calibration& c = report->calibration;
+  for (size_t i = 0; i < kStateSize; ++i) {
+    if (StateTable()[i].needs_fit) c.determined[i] = false;
+  }
+  if (!is_far) return;
+  double& variance = c.covariance(kStateDelay, kStateDelay);
+  const double middle_variance = variance + c.covariance(kStateDelay, kStateReadout) +
+                                 0.25 * c.covariance(kStateReadout, kStateReadout);
+  report->doubts.push_back(Format(
+      "the fit went to a focal length of %.0f px, which times no rows: the readout is not "
+      "known, and the delay of the first row no better than to half of it; in the middle "
+      "row it is %.1f ± %.1f ms",
+      c.lens[kFocal], 1e3 * (c.delay_s + 0.5 * c.readout_s), 1e3 * std::sqrt(middle_variance)));
+  variance += std::pow(0.5 * report->prior.sigma[kStateReadout], 2);
+  if (!IsUseful(kStateDelay, report->prior, c)) c.determined[kStateDelay] = false;
 }
 
 void AddDoubts(const Recording& recording, CalibrationReport* report) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/estimator/simulated_input.h"
 
@@ -38,6 +39,37 @@ TEST(Doubts, NothingIsBelievedOfAFocalLengthThatNoLensHas) {
     EXPECT_EQ(count(report), 0);
     ASSERT_FALSE(report.doubts.empty());
     EXPECT_THAT(report.doubts.front(), ::testing::HasSubstr("ran away"));
+  }
+}
+
+// A gimbal's camera ended with 4013 ± 2217 px and a readout of 0.4 ± 0.3 ms, which is 10 or more;
+// in the middle row its delay is right.
+TEST(Doubts, WithoutAReadoutTheDelayOfTheFirstRowIsUnknown) {
+  const simulation::Simulated s = simulation::SimulateTracks(ShortScenario(1.0)).value();
+  const Prior prior = StartOffTheTruth(s.truth);
+  CalibrationReport settled;
+  settled.prior = prior;
+  settled.calibration = s.truth;
+  settled.calibration.delay_s = -0.018;
+  settled.calibration.readout_s = 0.004;
+  const StateVector sigma = 0.01 * prior.sigma;
+  settled.calibration.covariance = sigma.cwiseAbs2().asDiagonal();
+  MarkDetermined(/*attitudes=*/false, prior, &settled.calibration);
+  for (const bool is_far : {false, true}) {
+    CalibrationReport report = settled;
+    DisbelieveFit(is_far, &report);
+    const Calibration& c = report.calibration;
+    ASSERT_EQ(report.doubts.size(), is_far ? 1U : 0U);
+    if (is_far) {
+      EXPECT_THAT(report.doubts.front(),
+                  ::testing::HasSubstr("in the middle row it is -16.0 ± 0."));
+    }
+    EXPECT_FALSE(c.determined[kStateFocal]);
+    EXPECT_FALSE(c.determined[kStateReadout]);
+    EXPECT_TRUE(c.determined[kStateBias]);
+    const double half_s = is_far ? 0.5 * prior.sigma[kStateReadout] : 0.0;
+    EXPECT_NEAR(c.sigma()[kStateDelay], std::hypot(sigma[kStateDelay], half_s), 1e-12);
+    EXPECT_EQ(c.determined[kStateDelay], c.sigma()[kStateDelay] < 3e-3);
   }
 }
 
