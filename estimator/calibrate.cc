@@ -94,10 +94,11 @@ class CalibrationJob {
     // Delay and bias come from rates; the rest needs a fit that has settled, at a lens like the
     // start's.
     const double focal_px = report_.calibration.lens[kFocal];
-    const bool is_far = IsFarFromRotations(focal_px, report_.start.focal) ||
-                        (!report_.calibration.determined[kStateFocal] &&
-                         RanAway(focal_px, from_start_.lens[kFocal]));
-    if (is_far || !report_.converged) DisbelieveFit(is_far, &report_);
+    const bool ran_away =
+        !report_.calibration.determined[kStateFocal] && RanAway(focal_px, from_start_.lens[kFocal]);
+    if (ran_away || !report_.converged || IsFarFromRotations(focal_px, report_.start.focal)) {
+      DisbelieveFit(ran_away, &report_);
+    }
     AddDoubts(recording_, &report_);
     Tell("refinement", 1.0);
     return std::move(report_);

@@ -42,12 +42,12 @@ void MarkDetermined(bool attitudes, const Prior& prior, Calibration* c) {
   if (!c->determined[kStateFocal]) c->determined[kStateReadout] = false;
 }
 
-void DisbelieveFit(bool is_far, CalibrationReport* report) {
+void DisbelieveFit(bool ran_away, CalibrationReport* report) {
   Calibration& c = report->calibration;
   for (size_t i = 0; i < kStateSize; ++i) {
     if (StateTable()[i].needs_fit) c.determined[i] = false;
   }
-  if (!is_far) return;
+  if (!ran_away) return;
   double& variance = c.covariance(kStateDelay, kStateDelay);
   const double middle_variance = variance + c.covariance(kStateDelay, kStateReadout) +
                                  0.25 * c.covariance(kStateReadout, kStateReadout);

@@ -13,11 +13,12 @@ namespace camgyro {
 void MarkDetermined(bool attitudes, const Prior& prior, Calibration* calibration);
 
 // Of a fit that is not believed: determined is only what comes from the rates, bias and delay.
-// is_far: its focal length is far from where it can be, so that nothing has timed the rows.
+// ran_away: its focal length is not determined, and nothing like the one that it began with, so
+// that nothing has timed the rows.
 // The rates tell the delay of the middle row, and that of the first row is half of a readout off,
 // which is no better known then than before the fit: its sigma is widened by that, and a doubt says
 // what the middle row's is.
-void DisbelieveFit(bool is_far, CalibrationReport* report);
+void DisbelieveFit(bool ran_away, CalibrationReport* report);
 
 // Adds to doubts and notes what speaks against a result that is complete otherwise.
 void AddDoubts(const Recording& recording, CalibrationReport* report);

@@ -55,19 +55,19 @@ TEST(Doubts, WithoutAReadoutTheDelayOfTheFirstRowIsUnknown) {
   const StateVector sigma = 0.01 * prior.sigma;
   settled.calibration.covariance = sigma.cwiseAbs2().asDiagonal();
   MarkDetermined(/*attitudes=*/false, prior, &settled.calibration);
-  for (const bool is_far : {false, true}) {
+  for (const bool ran_away : {false, true}) {
     CalibrationReport report = settled;
-    DisbelieveFit(is_far, &report);
+    DisbelieveFit(ran_away, &report);
     const Calibration& c = report.calibration;
-    ASSERT_EQ(report.doubts.size(), is_far ? 1U : 0U);
-    if (is_far) {
+    ASSERT_EQ(report.doubts.size(), ran_away ? 1U : 0U);
+    if (ran_away) {
       EXPECT_THAT(report.doubts.front(),
                   ::testing::HasSubstr("in the middle row it is -16.0 ± 0."));
     }
     EXPECT_FALSE(c.determined[kStateFocal]);
     EXPECT_FALSE(c.determined[kStateReadout]);
     EXPECT_TRUE(c.determined[kStateBias]);
-    const double half_s = is_far ? 0.5 * prior.sigma[kStateReadout] : 0.0;
+    const double half_s = ran_away ? 0.5 * prior.sigma[kStateReadout] : 0.0;
     EXPECT_NEAR(c.sigma()[kStateDelay], std::hypot(sigma[kStateDelay], half_s), 1e-12);
     EXPECT_EQ(c.determined[kStateDelay], c.sigma()[kStateDelay] < 3e-3);
   }
