@@ -226,8 +226,9 @@ Result<TrackingSummary> TrackRecording(const TrackerOptions& options,
   recording->tracks = std::move(followed.tracks);
   recording->matches.clear();
   recording->match_noise = MatchNoise::kSecondImage;
-  if (Status left = followed.unusable.LeaveOut(recording); !left)
+  if (Status left = followed.unusable.LeaveOut(recording); !left) {
     return tl::unexpected(left.error());
+  }
 
   TrackingSummary summary;
   summary.pictures = std::move(followed.kept);

@@ -26,7 +26,8 @@ constexpr double kMinEigenvalue = 1e-4;  // of the patch, per pixel: below it KL
 // corner.
 constexpr double kLeastVariance = 0.05;
 constexpr size_t kPointsForReference = 20;
-// A line through more grey values is no better, and takes longer than to align the patches.
+// Two numbers are asked of a line through grey values; cv::fitLine through all 190 of a frame took
+// 2.6 % of the processor time of `camgyro calibrate tools/sample` (perf record).
 constexpr size_t kPointsOfExposure = 50;
 // Frames for which a cell is left alone when no corner has been found in it: where there is nothing
 // to be found (a wall, the sky) a cell would be searched in every frame.
