@@ -322,9 +322,9 @@ TEST_F(CommandsTest, CalibrateMeasuredLensFromTheStart) {
   EXPECT_NEAR(camera["distortion"]["value"][0].as<double>(), -0.28, 0.02);
 }
 
-// Measured: a drone's lens that nothing declares, at the first try; f is published as 457.3 and
-// 459.4 px, and ours is a per cent longer, for a reason that is not known and in no sigma
-// (docs/lab/measured.md). Unseen frames tell that it is no radtan.
+// Measured: a drone's lens that nothing declares, at the first try. Unseen frames tell that it is
+// no radtan. Two published calibrations have 457.30 and 459.43 px for the rows and 1.003 times that
+// for the columns; the fit holds the ratio at 1, and finds the mean of rows and columns.
 TEST_F(CommandsTest, CalibrateMeasuredLensThatNobodyDeclares) {
   const auto recording = MeasuredData("euroc-v101-flight");
   if (!recording) GTEST_SKIP() << "*** SKIPPED: no measured recording euroc-v101-flight";
@@ -334,8 +334,11 @@ TEST_F(CommandsTest, CalibrateMeasuredLensThatNobodyDeclares) {
   const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
   EXPECT_EQ(result["effects"][0]["shape"].as<std::string>(), "kannala_brandt");
   const YAML::Node focal = result["camera"]["focal_px"];
-  EXPECT_NEAR(focal["value"].as<double>(), 458.35, 0.01 * 458.35);
-  EXPECT_LT(focal["sigma_total"].as<double>(), 6.0);
+  const double published[] = {457.296 * 1.001485, 459.429 * 1.001485};
+  EXPECT_NEAR(
+      focal["value"].as<double>(), 0.5 * (published[0] + published[1]),
+      3.0 * std::hypot(focal["sigma_total"].as<double>(), 0.5 * (published[1] - published[0])));
+  EXPECT_LT(focal["sigma_total"].as<double>(), 1.5);
 }
 
 // Measured: a drone's lens that nothing declares. The plain fit runs away to an f of some 4500 px;
