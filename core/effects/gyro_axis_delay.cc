@@ -12,12 +12,12 @@ class GyroAxisDelay final : public Effect {
  public:
   explicit GyroAxisDelay(const EffectSetup& setup)
       : Effect({{"y_after_x", "s", 0.01, -0.05, 0.05}, {"z_after_x", "s", 0.01, -0.05, 0.05}}),
-        derivatives_(setup) {}
+        derivatives_(setup, RateDerivatives::kFirst) {}
   void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
     const Eigen::Index at = derivatives_.At(time_s);
     if (at < 0) return;
-    columns(1, 0) = -derivatives_.first(1, at);
-    columns(2, 1) = -derivatives_.first(2, at);
+    columns(1, 0) = -derivatives_.values(1, at);
+    columns(2, 1) = -derivatives_.values(2, at);
   }
 
  private:

@@ -12,10 +12,11 @@ namespace {
 class GyroLowpass final : public Effect {
  public:
   explicit GyroLowpass(const EffectSetup& setup)
-      : Effect({{"time_constant_sq", "s^2", 4e-4, 0.0, 4e-3}}), derivatives_(setup) {}
+      : Effect({{"time_constant_sq", "s^2", 4e-4, 0.0, 4e-3}}),
+        derivatives_(setup, RateDerivatives::kSecond) {}
   void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
     const Eigen::Index at = derivatives_.At(time_s);
-    if (at >= 0) columns = 0.5 * derivatives_.second.col(at);
+    if (at >= 0) columns = 0.5 * derivatives_.values.col(at);
   }
 
  private:

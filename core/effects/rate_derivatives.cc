@@ -6,10 +6,10 @@
 
 namespace camgyro {
 
-RateDerivatives::RateDerivatives(const EffectSetup& setup) : times_s(setup.gyro_times_s) {
+RateDerivatives::RateDerivatives(const EffectSetup& setup, Order order)
+    : times_s(setup.gyro_times_s) {
   const auto n = static_cast<Eigen::Index>(times_s.size());
-  first.setZero(3, n);
-  second.setZero(3, n);
+  values.setZero(3, n);
   const double interval = (times_s.back() - times_s.front()) / static_cast<double>(n - 1);
   const auto half = std::max<Eigen::Index>(2, std::llround(0.025 / interval));
   const double unit = static_cast<double>(half) * interval;
@@ -23,8 +23,8 @@ RateDerivatives::RateDerivatives(const EffectSetup& setup) : times_s(setup.gyro_
       B += powers * setup.gyro_rad_s.col(j).transpose();
     }
     const Eigen::Matrix3d coefficients = A.inverse() * B;
-    first.col(i) = coefficients.row(1).transpose() / unit;
-    second.col(i) = 2.0 * coefficients.row(2).transpose() / (unit * unit);
+    const double scale = order == kFirst ? 1.0 / unit : 2.0 / (unit * unit);
+    values.col(i) = scale * coefficients.row(order).transpose();
   }
 }
 

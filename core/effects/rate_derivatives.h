@@ -9,18 +9,19 @@
 
 namespace camgyro {
 
-// Least-squares parabolas over 25 ms (at least 2 samples) to both sides of each sample; zero at the
-// ends. Columns: samples.
+// One of them: of least-squares parabolas over 25 ms (at least 2 samples) to both sides of each
+// sample; zero at the ends. Hours have millions of samples, so that nobody holds what he does not
+// need.
 struct RateDerivatives {
-  explicit RateDerivatives(const EffectSetup& setup);
+  enum Order { kFirst = 1, kSecond = 2 };
+  RateDerivatives(const EffectSetup& setup, Order order);
   // The sample at a time, or the first after it; -1 past the end.
   Eigen::Index At(double time_gyro_s) const;
   // Samples come every 25 ms or faster, and there are enough of them.
   static bool Possible(const EffectSetup& setup);
 
   std::vector<double> times_s;
-  Eigen::Matrix3Xd first;   // [rad/s^2]
-  Eigen::Matrix3Xd second;  // [rad/s^3]
+  Eigen::Matrix3Xd values;  // columns: samples [rad/s^2], [rad/s^3]
 };
 
 }  // namespace camgyro

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
@@ -172,20 +173,22 @@ Scores FirstColumns(Scores scores, Eigen::Index columns) {
   return scores;
 }
 
-Scores MergeShares(const Scores& first, const Scores& second) {
-  Scores both = first;
-  std::vector<BlockScore> blocks = first.blocks;
-  blocks.insert(blocks.end(), second.blocks.begin(), second.blocks.end());
+Scores MergeShares(Scores first, Scores second) {
+  const size_t of_first = first.blocks.size();
+  std::vector<BlockScore> blocks = std::move(first.blocks);
+  std::move(second.blocks.begin(), second.blocks.end(), std::back_inserter(blocks));
+  Scores both;
+  both.num_model = first.num_model;
+  both.pairs = std::move(first.pairs);
   std::vector<size_t> order(blocks.size()), rank(blocks.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(),
             [&](size_t i, size_t j) { return blocks[i].time_s < blocks[j].time_s; });
-  both.blocks.clear();
   for (size_t k = 0; k < order.size(); ++k) {
-    const BlockScore& block = blocks[order[k]];
+    BlockScore& block = blocks[order[k]];
     rank[order[k]] = k / 2;
     if (k % 2 == 0) {
-      both.blocks.push_back(block);
+      both.blocks.push_back(std::move(block));
       continue;
     }
     BlockScore& sum = both.blocks.back();
@@ -199,8 +202,8 @@ Scores MergeShares(const Scores& first, const Scores& second) {
   for (PairScore& pair : both.pairs) {
     pair.block = static_cast<int>(rank[static_cast<size_t>(pair.block)]);
   }
-  for (PairScore pair : second.pairs) {
-    pair.block = static_cast<int>(rank[first.blocks.size() + static_cast<size_t>(pair.block)]);
+  for (PairScore& pair : second.pairs) {
+    pair.block = static_cast<int>(rank[of_first + static_cast<size_t>(pair.block)]);
     both.pairs.push_back(std::move(pair));
   }
   std::sort(both.pairs.begin(), both.pairs.end(),

@@ -13,7 +13,7 @@ Scores FirstColumns(Scores scores, Eigen::Index columns);
 // Two shares with the same columns as one, pairs in the order of time. Two blocks that follow each
 // other become one: what wanders slowly is alike in neighbours, and blocks are to scatter
 // independently.
-Scores MergeShares(const Scores& first, const Scores& second);
+Scores MergeShares(Scores first, Scores second);
 
 // Variance of the scores between blocks over what the noise lets expect, and how many degrees of
 // freedom that knowledge is worth.

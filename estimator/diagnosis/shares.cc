@@ -56,7 +56,7 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input,
   // Tracks that the other shares see.
   std::set<int64_t> seen;
   const bool has_tracks = recording.matches.empty() && !recording.tracks.empty();
-  if (has_tracks) {
+  if (has_tracks && limits.with_report) {
     for (const TimedPair& pair : input.pairs) {
       if (share_of(block_of(pair.time_a_s)) == kReport) continue;
       for (const TrackedPoint& point : recording.tracks[static_cast<size_t>(pair.frame_a)]) {
@@ -71,6 +71,7 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input,
     const int64_t block = block_of(pair.time_a_s);
     if (block_of(pair.time_b_s) != block) continue;
     const Share share = share_of(block);
+    if (share == kReport && !limits.with_report) continue;
     std::vector<PairBlock>& blocks = share == kFit      ? shares.fit
                                      : share == kChoice ? shares.choice
                                                         : shares.report;

@@ -30,6 +30,7 @@ struct Shares {
 struct ShareLimits {
   static constexpr size_t kAll = std::numeric_limits<size_t>::max();
   size_t fit = kAll, choice = kAll;
+  bool with_report = true;  // false: `report` stays empty
 };
 
 // Short blocks, so that what changes with time is seen by all shares: 1/40 of the recording, within

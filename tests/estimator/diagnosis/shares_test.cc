@@ -41,6 +41,18 @@ TEST(Shares, NoFrameIsInTwoShares) {
   EXPECT_EQ(all.size(), fit.size() + choice.size() + report.size());
 }
 
+TEST(Shares, WithoutReportTheOthersAreTheSame) {
+  const Recording recording = Tracks(15.0);
+  const EstimationInput input = OutlineOf(recording);
+  const Shares all = MakeShares(recording, input);
+  const Shares without = MakeShares(recording, input, {100, 100, false});
+  EXPECT_TRUE(without.report.empty());
+  EXPECT_EQ(without.fit.size(), all.fit.size());
+  EXPECT_EQ(without.choice.size(), all.choice.size());
+  EXPECT_LE(Joined(without.fit).size(), 100u);
+  EXPECT_FALSE(without.fit.front().front().matches.empty());
+}
+
 TEST(Shares, NoTrackOfTheReportIsInAnotherShare) {
   const Recording recording = Tracks(15.0);
   const Shares shares = MakeShares(recording, MakeEstimationInput(recording));
