@@ -30,22 +30,6 @@ std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
   return rotations;
 }
 
-}  // namespace
-
-PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
-                                 const CalibrateOptions& options) {
-  PairGraphOptions graph_options = options.window.graph;
-  graph_options.match_noise = recording.match_noise;
-  graph_options.gyro_sigma_rad_s = GyroSigma(recording, start.delay_middle_row_s);
-  if (recording.gyro_info.random_walk_rad_s2_rtHz) {
-    graph_options.bias_walk_rad_s2_rtHz =
-        std::max(1e-6, *recording.gyro_info.random_walk_rad_s2_rtHz);
-  }
-  return graph_options;
-}
-
-namespace {
-
 // The stages of CalibrateRecording, one after the other.
 class CalibrationJob {
  public:
@@ -283,12 +267,13 @@ class CalibrationJob {
     refined_pairs_ = InformativePairs(input_, estimate_.delay_s,
                                       {options_.most_refined_pairs, left}, graph_options_);
     AddMatches(recording_, &refined_pairs_);
+    RefinementOptions refinement = OptionsOfRefinement();
     if (refined_pairs_.size() < input_.pairs.size()) {
+      refinement.most_kept_bytes = 0.0;  // there is no memory to spare
       report_.notes.push_back(
           Format("the recording is long: %zu of %zu pairs, those that tell most, are refined",
                  refined_pairs_.size(), input_.pairs.size()));
     }
-    RefinementOptions refinement = OptionsOfRefinement();
     Status online;
     Beside rest_of_window([&] { online = FinishWindow(); });
     Calibration from = estimate_;
@@ -389,6 +374,18 @@ class CalibrationJob {
 };
 
 }  // namespace
+
+PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
+                                 const CalibrateOptions& options) {
+  PairGraphOptions graph_options = options.window.graph;
+  graph_options.match_noise = recording.match_noise;
+  graph_options.gyro_sigma_rad_s = GyroSigma(recording, start.delay_middle_row_s);
+  if (recording.gyro_info.random_walk_rad_s2_rtHz) {
+    graph_options.bias_walk_rad_s2_rtHz =
+        std::max(1e-6, *recording.gyro_info.random_walk_rad_s2_rtHz);
+  }
+  return graph_options;
+}
 
 Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                                              const CameraRotationsAt& rotations_at,

@@ -106,11 +106,6 @@ constexpr double kRoughly = 1e-4;
 
 constexpr int kLeastPairs = 10;
 
-// Linearisations are kept while nothing changes, from a step that is tried to its derivatives and
-// from the last step to the covariance, unless they are larger than this: those of some minutes of
-// recording. Longer ones need their memory for Ceres' copies of them.
-constexpr double kMostKeptBytes = 128e6;
-
 double KeptBytes(const std::vector<TimedPair>& pairs, const PairGraphOptions& options) {
   double bytes = 0.0;
   for (const TimedPair& pair : pairs) {
@@ -195,7 +190,7 @@ class Refinement {
     for (size_t i = 0; i < ids_.size(); ++i) factors[ids_[i]] = noise_now_.factors[i];
     graph_options_.sigma = noise_now_.scale;
     graph_options_.keep_within_sigmas =
-        KeptBytes(pairs_, graph_options_) <= kMostKeptBytes ? 0.0 : -1.0;
+        KeptBytes(pairs_, graph_options_) <= options_.most_kept_bytes ? 0.0 : -1.0;
     built_at_ = result_.calibration;
     graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_,
                                          result_.rounds == 1 ? options_.latents : nullptr);

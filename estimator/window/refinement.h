@@ -38,6 +38,10 @@ struct RefinementOptions {
   bool frame_times_alone = false;
   // The pairs' factors are found; false: they stay as they are.
   bool find_noise_factors = true;
+  // Linearisations are kept while nothing changes, from a step that is tried to its derivatives and
+  // from the last step to the covariance, unless they are larger than this: those of some minutes
+  // of recording. Longer ones need their memory for Ceres' copies of them.
+  double most_kept_bytes = 128e6;
   // Of a fit that has settled, whose result and noise this one starts from; null: of none.
   std::shared_ptr<const PairLatents> latents;
 };
