@@ -22,14 +22,6 @@ namespace {
 
 constexpr int kMinPairsForUnseen = 60;  // below, setting frames aside costs more than it tells
 
-std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
-  std::vector<CameraRotation> rotations;
-  for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
-    rotations.push_back(pair.rotation);
-  }
-  return rotations;
-}
-
 // The stages of CalibrateRecording, one after the other.
 class CalibrationJob {
  public:
@@ -325,7 +317,12 @@ class CalibrationJob {
   // Refits without the tracks that move, if there are any. Returns the halves of the fit that is
   // taken: that of all tracks also where the halves disagree without the movers as well, since what
   // contradicts itself then is the model, and leaving out what it does not explain would hide it.
+  // A fit that is lost knows nothing of tracks, and its refits take longest.
   Halves LeaveOutWhatMoves(const RefinementOptions& options, Refined* refined) {
+    if (!refined->converged ||
+        RanAway(refined->calibration.lens[kFocal], from_start_.lens[kFocal])) {
+      return FitHalves(refined_pairs_, options, *refined);
+    }
     const Result<StillFit> still = FitWhatIsStill(
         input_, refined_pairs_, options.graph,
         [&](const std::vector<TimedPair>& pairs, const Refined* before) -> Result<Refined> {

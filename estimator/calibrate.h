@@ -45,9 +45,10 @@ struct CalibrateOptions {
   size_t most_refined_pairs = 9000;
   // Nor so many that they and the recording take more memory than that, about (RefinementBytes,
   // BytesOf): a gibibyte less what a program holds without a recording, and for what the sum does
-  // not count (the online estimates, 75 MB in an hour). But always what is told by this many.
-  double most_bytes = 800e6;
-  double least_refined_bytes = 150e6;
+  // not count (the online estimates, 75 MB in an hour, and the fits of the halves). But always what
+  // is told by this many.
+  double most_bytes = 750e6;
+  double least_refined_bytes = 100e6;
 };
 
 // What an effect that nobody has declared has in the error of each parameter: if it were known, the

@@ -12,6 +12,14 @@
 
 namespace camgyro {
 
+std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
+  std::vector<CameraRotation> rotations;
+  for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
+    rotations.push_back(pair.rotation);
+  }
+  return rotations;
+}
+
 Prior MakePrior(const Recording& recording, const StartResult& start) {
   const CameraGuess& guess = recording.camera;
   Prior result;

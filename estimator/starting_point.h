@@ -3,6 +3,7 @@
 #define CAMGYRO_ESTIMATOR_STARTING_POINT_H_
 
 #include <string>
+#include <vector>
 
 #include "core/calibration.h"
 #include "core/recording.h"
@@ -11,6 +12,9 @@
 #include "estimator/window/residuals/pair_residual.h"
 
 namespace camgyro {
+
+// Of the neighbours of a recording with attitudes.
+std::vector<CameraRotation> NeighbourRotations(const Recording& recording);
 
 // The Gaussian prior of a calibration, as wide as the table of the state says (core/state.h).
 //   f: the declared one, else the scan's; c: the declared one, else the centre; t_r: declared, else

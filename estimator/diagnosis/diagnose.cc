@@ -13,13 +13,7 @@ namespace {
 // Rotations of the camera, whatever the recording has.
 std::vector<CameraRotation> CameraRotationsIn(const Recording& recording,
                                               const CameraRotationsAt& rotations_at) {
-  if (recording.HasOnlyAttitudes()) {
-    std::vector<CameraRotation> rotations;
-    for (const TimedPair& pair : MakeEstimationInput(recording).pairs) {
-      rotations.push_back(pair.rotation);
-    }
-    return rotations;
-  }
+  if (recording.HasOnlyAttitudes()) return NeighbourRotations(recording);
   return rotations_at(recording, {{FocalToBeginWith(recording.camera), {}}}).front();
 }
 
