@@ -40,7 +40,7 @@ struct PairGraphOptions {
   double rate_margin_s = 0.004;
   // Noise of the gyro is estimated as its mean over so long, or less where what that neglects, a
   // random walk of the angle within the step, would turn the picture by more than so many pixels
-  // (rms); one value per sample where effects change the rates.
+  // (rms).
   double rate_step_s = 0.025;
   double rate_step_px = 0.05;
   // That many samples.

@@ -25,7 +25,36 @@ std::vector<double> Intervals(const std::deque<TimedRate>& samples) {
   return intervals;
 }
 
+bool ChangesRates(const EffectSet& effects) {
+  return std::any_of(effects.items().begin(), effects.items().end(),
+                     [](const auto& item) { return item.entry->part == ModelPart::kRate; });
+}
+
 }  // namespace
+
+double NeglectedPx(const std::vector<TimedRate>& rates, const PairGraphOptions& options,
+                   double focal_px, const EffectSet& effects, const Eigen::VectorXd& change) {
+  if (rates.size() < 2 || !ChangesRates(effects)) return 0.0;
+  const double interval_s =
+      (rates.back().time_s - rates.front().time_s) / static_cast<double>(rates.size() - 1);
+  const auto step = static_cast<size_t>(options.RateStep(interval_s, focal_px));
+  double largest = 0.0;
+  Eigen::Matrix3Xd columns(3, effects.size()), of_value(3, step);
+  for (size_t first = 0; first + step <= rates.size(); first += step) {
+    for (size_t i = 0; i < step; ++i) {
+      const TimedRate& rate = rates[first + i];
+      effects.ChangeRate(rate.time_s, rate.omega_gyro_rad_s, columns);
+      of_value.col(static_cast<Eigen::Index>(i)) = columns * change;
+    }
+    of_value.colwise() -= of_value.rowwise().mean().eval();
+    Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+    for (const auto& rate : of_value.colwise()) {
+      turn += interval_s * rate;
+      largest = std::max(largest, turn.norm());
+    }
+  }
+  return focal_px * largest;
+}
 
 int PairGraphOptions::RateStep(double interval_s, double focal_px) const {
   constexpr double kMost = 1e6;  // an int holds it
@@ -67,11 +96,6 @@ void RateGroups::Forget(double before_s) {
 }
 
 int RateGroups::Step(double focal_px) const {
-  if (effects_ != nullptr) {
-    for (const auto& item : effects_->items()) {
-      if (item.entry->part == ModelPart::kRate) return 1;
-    }
-  }
   return options_.RateStep(median_interval_s_, focal_px);
 }
 
@@ -164,31 +188,40 @@ void RateGroups::PlanGroup(int64_t first, int64_t last, const FactorGraph& graph
   Eigen::Matrix3Xd measured(3, group.count);
   for (int i = 0; i < group.count; ++i) measured.col(i) = ChainRateOf(first + i);
   Eigen::Matrix3Xd rates = measured.colwise() - bias;
-  if (cover->step > 1) {
-    // Corrections x of rates less the bias of now: x + bias - bias of now is noise.
-    std::vector<int> samples;
-    for (int i = 0; i < group.count; i += cover->step) {
-      samples.push_back(std::min(cover->step, group.count - i));
-    }
-    const auto values = static_cast<Eigen::Index>(samples.size());
-    group.base = rates;
-    cover->values = Eigen::VectorXd::Zero(3 * values);
-    cover->reading =
-        std::make_shared<GyroRate>(bias.replicate(1, values), samples, options_.gyro_sigma_rad_s);
-    return;
-  }
   std::vector<double> times_s;
-  if (effects_ != nullptr) {
+  cover->reading_has_effects = effects_ != nullptr && ChangesRates(*effects_);
+  if (cover->reading_has_effects) {
     const PairEffects now{effects_.get(), graph.value(kEffectsBlock).data()};
     for (int i = 0; i < group.count; ++i) {
       times_s.push_back(sample(first + i).time_s);
       rates.col(i) = TrueRate(now, times_s.back(), rates.col(i));
     }
   }
-  cover->reading_has_effects = effects_ != nullptr;
+  if (cover->step > 1) {
+    // Corrections x of what the rates are with the bias and the effects of now. How the samples of
+    // one value differ stays as it is while effects change (NeglectedPx).
+    std::vector<int> samples;
+    Eigen::Matrix3Xd means = bias.replicate(1, (group.count + cover->step - 1) / cover->step);
+    for (int i = 0; i < group.count; i += cover->step) {
+      const int count = std::min(cover->step, group.count - i);
+      if (cover->reading_has_effects) {
+        means.col(i / cover->step) = (measured - rates).middleCols(i, count).rowwise().mean();
+      }
+      samples.push_back(count);
+    }
+    group.base = rates;
+    cover->values = Eigen::VectorXd::Zero(means.size());
+    cover->reading = cover->reading_has_effects
+                         ? std::make_shared<GyroRate>(means, samples, options_.gyro_sigma_rad_s,
+                                                      effects_, std::move(times_s), rates)
+                         : std::make_shared<GyroRate>(means, samples, options_.gyro_sigma_rad_s);
+    return;
+  }
   cover->values = Eigen::Map<const Eigen::VectorXd>(rates.data(), rates.size());
-  cover->reading =
-      std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s, effects_, std::move(times_s));
+  cover->reading = cover->reading_has_effects
+                       ? std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s, effects_,
+                                                    std::move(times_s))
+                       : std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s);
 }
 
 void RateGroups::AddTo(const Cover& cover, FactorGraph* graph) {

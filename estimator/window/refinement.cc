@@ -138,9 +138,7 @@ class Refinement {
   Result<Refined> Run() {
     for (result_.rounds = 1; result_.rounds <= options_.max_rounds; ++result_.rounds) {
       const Calibration before = result_.calibration;
-      // Rates are kept around the pairs as the delay was when they were added.
-      if (graph_ == nullptr ||
-          LargestShift(pairs_, before, built_at_) > 0.5 * graph_options_.rate_margin_s) {
+      if (graph_ == nullptr || IsBuiltForOthers(before)) {
         if (const Status built = Build(); !built) return tl::unexpected(built.error());
       }
       // Every round searches the directions anew: with the calibration of the round before, another
@@ -183,6 +181,15 @@ class Refinement {
   }
 
  private:
+  // Rates are kept around the pairs as the delay was when they were added, and those of the samples
+  // of one value differ as they did with the effects of then.
+  bool IsBuiltForOthers(const Calibration& now) const {
+    if (LargestShift(pairs_, now, built_at_) > 0.5 * graph_options_.rate_margin_s) return true;
+    if (now.effects == nullptr || facts_.of_attitudes) return false;
+    return NeglectedPx(input_.rates, graph_options_, built_at_.lens[kFocal], *now.effects,
+                       now.effect_values - built_at_.effect_values) > graph_options_.rate_step_px;
+  }
+
   // The graph at the present calibration.
   Status Build() {
     std::map<int64_t, double> factors;

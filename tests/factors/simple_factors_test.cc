@@ -1,5 +1,8 @@
 #include <gmock/gmock.h>
 
+#include <memory>
+
+#include "core/effects/catalogue.h"
 #include "factors/bias_walk.h"
 #include "factors/gyro_rate.h"
 #include "tests/factors/difference_check.h"
@@ -43,6 +46,28 @@ TEST(GyroRate, ReadingsMayBeMeansOfSamples) {
   ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
   EXPECT_LT((r - (Eigen::Matrix<double, 6, 1>() << 2, 0, 0, 1, 0, 0).finished()).norm(), 1e-10);
   ExpectJacobiansMatchDifferences(factor, {rates.data(), bias.data()}, 1e-6);
+}
+
+// Three samples with one correction, and one by itself, of a gyro that reads 2 % too much about x.
+TEST(GyroRate, MeansOfSamplesHaveTheMeanOfTheEffects) {
+  const auto effects = MakeEffects("gyro_scale", EffectSetup());
+  ASSERT_TRUE(effects);
+  const auto set = std::make_shared<const EffectSet>(*effects);
+  Eigen::Matrix3Xd base(3, 4);
+  base << 1.0, 2.0, 3.0, 4.0, 0.5, 0.5, 0.5, 0.5, -1.0, -1.0, -1.0, -1.0;
+  Eigen::Matrix3Xd corrections(3, 2);
+  corrections << 0.1, -0.2, 0.0, 0.0, 0.0, 0.0;
+  // What the samples read beyond their base: correction, bias, and what the effect adds to the
+  // rate.
+  Eigen::Vector3d bias(0.003, 0.0, 0.0), scale(0.02, 0.0, 0.0);
+  Eigen::Matrix3Xd measured(3, 2);
+  measured << 0.1 + 0.003 + 0.02 * 2.1, -0.2 + 0.003 + 0.02 * 3.8, 0.0, 0.0, 0.0, 0.0;
+  const GyroRate factor(measured, {3, 1}, {0.003, 0.003, 0.003}, set, {0.0, 0.1, 0.2, 0.3}, base);
+  Eigen::Matrix<double, 6, 1> r;
+  const double* parameters[] = {corrections.data(), bias.data(), scale.data()};
+  ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
+  EXPECT_LT(r.norm(), 1e-10);
+  ExpectJacobiansMatchDifferences(factor, {corrections.data(), bias.data(), scale.data()}, 1e-6);
 }
 
 }  // namespace
