@@ -44,9 +44,8 @@ LENS = ("intrinsics: [%.3f, 470.0, 376.0, 240.0]\ndistortion_model: radtan\n"
 
 # Two calibrations of one camera: original/cam0_sensor.yaml, and data/euroc_ds_calib.json of Basalt
 # (gitlab.com/VladyslavUsenko/basalt), whose focal length in the middle is fy / (1 + xi). Both have
-# the same ratio fx / fy. Biases: of
-# the ground-truth file (README.md of euroc-v101-rest), and the gyro's mean over the first 4 s of
-# the recording, at rest. Global shutter; hardware-synchronised.
+# the same ratio fx / fy. Biases: of the ground-truth file (README.md of euroc-v101-rest), and the
+# gyro's mean over the first 4 s of the recording, at rest. Global shutter; hardware-synchronised.
 EUROC = dict(f=(457.296, 459.429), ratio=458.654 / 457.296, c_x=(367.215, 365.894),
              c_y=(248.375, 249.330), t_r=0.0, t_d=0.0,
              b_x=(-0.0022, -0.0020), b_y=(0.0207, 0.0209), b_z=(0.0758, 0.0781), q=EUROC_Q,

@@ -9,9 +9,8 @@
 
 namespace camgyro {
 
-// One of them: of least-squares parabolas over 25 ms (at least 2 samples) to both sides of each
-// sample; zero at the ends. Hours have millions of samples, so that nobody holds what he does not
-// need.
+// The first or the second, of least-squares parabolas over 25 ms (at least 2 samples) to both sides
+// of each sample; zero at the ends. One of them only: hours have millions of samples.
 struct RateDerivatives {
   enum Order { kFirst = 1, kSecond = 2 };
   RateDerivatives(const EffectSetup& setup, Order order);
@@ -21,7 +20,7 @@ struct RateDerivatives {
   static bool Possible(const EffectSetup& setup);
 
   std::vector<double> times_s;
-  Eigen::Matrix3Xd values;  // columns: samples [rad/s^2], [rad/s^3]
+  Eigen::Matrix3Xd values;  // columns: samples [rad/s^2] or [rad/s^3]
 };
 
 }  // namespace camgyro
