@@ -126,7 +126,7 @@ Status OnlineCalibration::TryStart() {
   if (!point) return tl::unexpected(point.error());
   progress_.prior_sigma = point->prior.sigma;
   SlidingWindowOptions window_options;
-  window_options.graph = GraphOptionsFor(recording, *start, {});
+  window_options.graph = GraphOptionsFor(recording, *start, window_options.graph);
   window_options.skew_walk_rtHz = kSkewWalk_rtHz;
   window_.emplace(point->estimate, point->prior, gyro_.front().stamp_ns, window_options);
   window_->SetListener([this](const WindowUpdate& update) { Remember(update); });

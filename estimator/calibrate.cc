@@ -20,8 +20,6 @@
 namespace camgyro {
 namespace {
 
-constexpr int kMinPairsForUnseen = 60;  // below, setting frames aside costs more than it tells
-
 // The stages of CalibrateRecording, one after the other.
 class CalibrationJob {
  public:
@@ -114,7 +112,7 @@ class CalibrationJob {
       estimate_ = std::move(point->estimate);
     }
     from_start_ = estimate_;
-    graph_options_ = GraphOptionsFor(recording_, *start, options_);
+    graph_options_ = GraphOptionsFor(recording_, *start, options_.window.graph);
     return CheckEffects();
   }
 
@@ -243,15 +241,6 @@ class CalibrationJob {
     return Refine(input_, pairs, fit.calibration, report_.prior, with);
   }
 
-  // Each half alone, from the fit of the whole: it is near, and a half that disagrees leaves it.
-  Halves FitHalves(const std::vector<TimedPair>& pairs, const RefinementOptions& options,
-                   const Refined& whole) const {
-    if (static_cast<int>(pairs.size()) < kMinPairsForUnseen) return {};
-    HalvesFit fit(input_, pairs, whole, report_.prior, options);
-    ParallelFor(2, [&](size_t half) { fit.Fit(half); });
-    return fit.Compare();
-  }
-
   Status Refinement() {
     Tell("refinement", 0.0);
     const double left =
@@ -321,7 +310,7 @@ class CalibrationJob {
   Halves LeaveOutWhatMoves(const RefinementOptions& options, Refined* refined) {
     if (!refined->converged ||
         RanAway(refined->calibration.lens[kFocal], from_start_.lens[kFocal])) {
-      return FitHalves(refined_pairs_, options, *refined);
+      return FitHalves(input_, refined_pairs_, *refined, report_.prior, options);
     }
     const Result<StillFit> still = FitWhatIsStill(
         input_, refined_pairs_, options.graph,
@@ -330,7 +319,7 @@ class CalibrationJob {
                                    : RefineFrom(*before, pairs, options);
         });
     if (still && still->moving > 0) {
-      const Halves halves = FitHalves(still->pairs, options, still->fit);
+      const Halves halves = FitHalves(input_, still->pairs, still->fit, report_.prior, options);
       if (!(halves.chi2 > kHalvesLimit)) {
         *refined = still->fit;
         report_.moving_tracks = still->moving;
@@ -340,7 +329,7 @@ class CalibrationJob {
         return halves;
       }
     }
-    return FitHalves(refined_pairs_, options, *refined);
+    return FitHalves(input_, refined_pairs_, *refined, report_.prior, options);
   }
 
   void TakeHalves(const Halves& halves) {
@@ -371,18 +360,6 @@ class CalibrationJob {
 };
 
 }  // namespace
-
-PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
-                                 const CalibrateOptions& options) {
-  PairGraphOptions graph_options = options.window.graph;
-  graph_options.match_noise = recording.match_noise;
-  graph_options.gyro_sigma_rad_s = GyroSigma(recording, start.delay_middle_row_s);
-  if (recording.gyro_info.random_walk_rad_s2_rtHz) {
-    graph_options.bias_walk_rad_s2_rtHz =
-        std::max(1e-6, *recording.gyro_info.random_walk_rad_s2_rtHz);
-  }
-  return graph_options;
-}
 
 Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                                              const CameraRotationsAt& rotations_at,

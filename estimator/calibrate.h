@@ -99,10 +99,6 @@ Result<CalibrationReport> CalibrateRecording(const Recording& recording,
                                              const CalibrateOptions& options,
                                              const Progress& progress = nullptr);
 
-// Noise and loss as CalibrateRecording uses them for this recording.
-PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
-                                 const CalibrateOptions& options);
-
 }  // namespace camgyro
 
 #endif  // CAMGYRO_ESTIMATOR_CALIBRATE_H_

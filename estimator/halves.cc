@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "core/parallel.h"
 #include "estimator/astray.h"
 
 namespace camgyro {
@@ -13,6 +15,8 @@ namespace {
 // knows half): the directions are still the right ones, and are searched anew only where the half
 // leaves the whole by more.
 constexpr double kSettledRound = 5.0;
+constexpr size_t kLeastPairs = 60;
+
 // A chi-square per parameter that is to be near 1 or not needs no better sigmas than these.
 constexpr double kSettledScale = 0.1;
 
@@ -37,38 +41,38 @@ double HalvesChi2(const Calibration& first, const Calibration& second, const Cal
   return Chi2PerParameter(Difference(half, whole), 0.5 * half.covariance);
 }
 
-HalvesFit::HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-                     const Refined& whole, const Prior& prior, const RefinementOptions& refinement)
-    : input_(input), whole_(whole), prior_(prior), refinement_(refinement) {
+Halves FitHalves(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+                 const Refined& whole, const Prior& prior, const RefinementOptions& refinement) {
+  Halves result;
+  if (pairs.size() < kLeastPairs) return result;
+  std::array<std::vector<TimedPair>, 2> halves;
   const auto middle = pairs.begin() + static_cast<std::ptrdiff_t>(pairs.size() / 2);
-  halves_[0].assign(pairs.begin(), middle);
+  halves[0].assign(pairs.begin(), middle);
   for (auto pair = middle; pair != pairs.end(); ++pair) {
-    if (pair->time_a_s > halves_[0].back().time_b_s) halves_[1].push_back(*pair);
+    if (pair->time_a_s > halves[0].back().time_b_s) halves[1].push_back(*pair);
   }
-}
-
-void HalvesFit::Fit(size_t half) {
-  RefinementOptions options = refinement_;
-  options.max_rounds = std::min(4, refinement_.max_rounds);
+  RefinementOptions options = refinement;
+  options.max_rounds = std::min(4, refinement.max_rounds);
   options.settled_round = kSettledRound;
   options.settled_scale = kSettledScale;
-  options.cluster_s = 0.5 * refinement_.cluster_s;
-  options.graph.sigma = whole_.quality.noise_px;
-  options.latents = whole_.latents;
+  options.cluster_s = 0.5 * refinement.cluster_s;
+  options.graph.sigma = whole.quality.noise_px;
+  options.latents = whole.latents;
   // A half that runs away would find much noise where the whole fits, and run on.
   options.find_noise_factors = false;
-  const Result<Refined> fit = Refine(input_, halves_.at(half), whole_.calibration, prior_, options);
-  if (!fit) return;
-  fits_.at(half) = fit->calibration;
-  const std::vector<TimedPair>& other = halves_.at(1 - half);
-  if (other.empty() || other.front().matches.empty()) return;  // attitudes
-  others_.at(half) =
-      EvaluateUnseen(input_, other, fit->calibration, fit->quality.noise_px, refinement_.graph);
-}
-
-Halves HalvesFit::Compare() const {
+  std::array<std::optional<Calibration>, 2> fits;
+  std::array<std::optional<UnseenFit>, 2> others;  // of each fit, in the other half
+  ParallelFor(2, [&](size_t half) {
+    const Result<Refined> fit = Refine(input, halves.at(half), whole.calibration, prior, options);
+    if (!fit) return;
+    fits.at(half) = fit->calibration;
+    const std::vector<TimedPair>& other = halves.at(1 - half);
+    if (other.empty() || other.front().matches.empty()) return;  // attitudes
+    others.at(half) =
+        EvaluateUnseen(input, other, fit->calibration, fit->quality.noise_px, refinement.graph);
+  });
   UnseenFit unseen;
-  for (const auto& other : others_) {
+  for (const auto& other : others) {
     if (!other) continue;
     unseen.rms_px = std::sqrt((unseen.matches * unseen.rms_px * unseen.rms_px +
                                other->matches * other->rms_px * other->rms_px) /
@@ -76,10 +80,8 @@ Halves HalvesFit::Compare() const {
     unseen.matches += other->matches;
     unseen.pairs += other->pairs;
   }
-  Halves result;
   if (unseen.matches > 0) result.unseen = unseen;
-  if (!fits_[0] || !fits_[1]) return result;
-  result.chi2 = HalvesChi2(*fits_[0], *fits_[1], whole_.calibration);
+  if (fits[0] && fits[1]) result.chi2 = HalvesChi2(*fits[0], *fits[1], whole.calibration);
   return result;
 }
 

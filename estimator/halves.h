@@ -3,8 +3,6 @@
 #ifndef CAMGYRO_ESTIMATOR_HALVES_H_
 #define CAMGYRO_ESTIMATOR_HALVES_H_
 
-#include <array>
-#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -33,27 +31,11 @@ struct Halves {
   std::optional<UnseenFit> unseen;
 };
 
-// Each half of the pairs is fitted alone, from a fit of them all, and the other one tells how well.
-// The pairs across the middle belong to neither, so that no frame is in both.
-class HalvesFit {
- public:
-  // The arguments have to outlive this.
-  HalvesFit(const EstimationInput& input, const std::vector<TimedPair>& pairs, const Refined& whole,
-            const Prior& prior, const RefinementOptions& refinement);
-  // Fits half 0 or 1: beside the other, if it likes to.
-  void Fit(size_t half);
-  // Once both are fitted.
-  Halves Compare() const;
-
- private:
-  const EstimationInput& input_;
-  const Refined& whole_;
-  const Prior& prior_;
-  const RefinementOptions& refinement_;
-  std::array<std::vector<TimedPair>, 2> halves_;
-  std::array<std::optional<Calibration>, 2> fits_;
-  std::array<std::optional<UnseenFit>, 2> others_;  // of each fit, in the other half
-};
+// Each half of the pairs is fitted alone, beside the other, from a fit of them all, and the other
+// one tells how well. The pairs across the middle belong to neither, so that no frame is in both.
+// Nothing of fewer than 60 pairs: setting frames aside would cost more than it tells.
+Halves FitHalves(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+                 const Refined& whole, const Prior& prior, const RefinementOptions& refinement);
 
 }  // namespace camgyro
 

@@ -100,6 +100,16 @@ Status AddStartEffects(const Recording& recording, const StartResult& start,
   return {};
 }
 
+PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
+                                 PairGraphOptions options) {
+  options.match_noise = recording.match_noise;
+  options.gyro_sigma_rad_s = GyroSigma(recording, start.delay_middle_row_s);
+  if (recording.gyro_info.random_walk_rad_s2_rtHz) {
+    options.bias_walk_rad_s2_rtHz = std::max(1e-6, *recording.gyro_info.random_walk_rad_s2_rtHz);
+  }
+  return options;
+}
+
 Result<StartingPoint> MakeStartingPoint(const Recording& recording, const StartResult& start,
                                         const std::string& effects, const PairResidual& residual) {
   StartingPoint point;

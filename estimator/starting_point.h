@@ -9,6 +9,7 @@
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/start/find_start.h"
+#include "estimator/window/pair_graph_options.h"
 #include "estimator/window/residuals/pair_residual.h"
 
 namespace camgyro {
@@ -22,6 +23,10 @@ std::vector<CameraRotation> NeighbourRotations(const Recording& recording);
 //   with its sigma where that is wider than the table's. Attitudes: t_r 0, and units for what needs
 //   pixels.
 Prior MakePrior(const Recording& recording, const StartResult& start);
+
+// Options with the noise of this recording's matches and gyro.
+PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,
+                                 PairGraphOptions options);
 
 // Puts effects into a calibration that has none: those of a list (MakeEffects), and those that the
 // start has found (EffectEntry::found_at_start) and the residual can have, with the values where a

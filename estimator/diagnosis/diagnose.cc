@@ -138,7 +138,7 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
     return diagnosis;
   }
   AddFoundAtStart(report, &diagnosis);
-  input.graph = GraphOptionsFor(recording, report.start, options.calibrate);
+  input.graph = GraphOptionsFor(recording, report.start, options.calibrate.window.graph);
   input.noise = report.quality.noise_px;
   if (!(input.noise > 0.0)) {
     input.noise = recording.HasOnlyAttitudes() ? kFirstNoiseRad : kFirstNoisePx;
