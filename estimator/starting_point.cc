@@ -3,12 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 
+#include "core/parallel.h"
 #include "core/usual_focal.h"
+#include "estimator/astray.h"
 #include "estimator/gyro_clock.h"
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/refinement.h"
 
 namespace camgyro {
 
@@ -110,6 +115,41 @@ PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& 
   return options;
 }
 
+namespace {
+
+constexpr size_t kPairsToTell = 60;  // two steps sideways that look like turns differ in most pairs
+
+// Of two fits of some pairs, from the estimate and from it without a bias: where the second one is
+// better, its bias, else that of the estimate.
+Eigen::Vector3d BiasWithOrWithout(const Recording& recording, const StartResult& start,
+                                  const PairResidual& residual, const StartingPoint& point) {
+  const EstimationInput input = OutlineOf(recording, SelectPairs(recording));
+  std::vector<TimedPair> pairs;
+  const size_t stride = (input.pairs.size() + kPairsToTell - 1) / kPairsToTell;
+  for (size_t i = 0; i < input.pairs.size(); i += stride) pairs.push_back(input.pairs[i]);
+  AddMatches(recording, &pairs);
+  PairGraphOptions graph;
+  graph.residual = &residual;
+  RefinementOptions options;
+  options.graph = GraphOptionsFor(recording, start, graph);
+  std::array<std::optional<Refined>, 2> ended;
+  ParallelFor(2, [&](size_t k) {
+    Calibration from = point.estimate;
+    if (k == 1) from.bias_gyro_rad_s.setZero();
+    Result<Refined> fit = Refine(input, pairs, from, point.prior, options);
+    if (fit && fit->converged && !RanAway(fit->calibration.lens[kFocal], from.lens[kFocal])) {
+      ended.at(k) = *std::move(fit);
+    }
+  });
+  const auto noise = [](const std::optional<Refined>& fit) {
+    return fit ? fit->quality.noise_px : std::numeric_limits<double>::infinity();
+  };
+  return noise(ended[1]) < noise(ended[0]) ? ended[1]->calibration.bias_gyro_rad_s
+                                           : point.estimate.bias_gyro_rad_s;
+}
+
+}  // namespace
+
 Result<StartingPoint> MakeStartingPoint(const Recording& recording, const StartResult& start,
                                         const std::string& effects, const PairResidual& residual) {
   StartingPoint point;
@@ -124,6 +164,10 @@ Result<StartingPoint> MakeStartingPoint(const Recording& recording, const StartR
   if (const Status added = AddStartEffects(recording, start, effects, residual, &point.estimate);
       !added) {
     return tl::unexpected(added.error());
+  }
+  const auto large = point.prior.sigma.segment<3>(kStateBias).array();
+  if (!recording.HasOnlyAttitudes() && (start.bias_gyro_rad_s.array().abs() > large).any()) {
+    point.estimate.bias_gyro_rad_s = BiasWithOrWithout(recording, start, residual, point);
   }
   return point;
 }

@@ -39,7 +39,10 @@ Status AddStartEffects(const Recording& recording, const StartResult& start,
 // Where a fit begins, and what is held to be likely before.
 struct StartingPoint {
   Prior prior;
-  Calibration estimate;  // the prior's mean with the start's bias, focal length and effects
+  // The prior's mean with the start's focal length, effects and bias. A step sideways looks like a
+  // turn, to rotations: where a bias beyond the prior's sigma may be that, one that is found
+  // without it.
+  Calibration estimate;
 };
 
 // MakePrior and AddStartEffects, with what else the start has found. Errors: of the effects' list.

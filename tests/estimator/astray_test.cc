@@ -61,26 +61,6 @@ TEST(Astray, WhatSpeaksAgainstAnEffect) {
   EXPECT_FALSE(IsSeen(item, fit));
 }
 
-// 10 s of a room with a camera of 752 x 480.
-simulation::Scenario Room() {
-  simulation::Scenario scenario = ShortScenario(10.0);
-  scenario.camera.width_px = 752;
-  scenario.camera.focal_px = 458.0;
-  scenario.scene.kind = simulation::SceneKind::kRoom;
-  scenario.motion.speed_m_s = 0.8;
-  scenario.motion.path_radius_m = 1.5;
-  scenario.motion.heading_deg = 60.0;
-  return scenario;
-}
-
-// The same with a lens like that of EuRoC's drone.
-simulation::Scenario RoomThroughALens() {
-  simulation::Scenario scenario = Room();
-  scenario.effects.radial_distortion.k1 = -0.28;
-  scenario.effects.radial_distortion.k2 = 0.07;
-  return scenario;
-}
-
 Result<CalibrationReport> Calibrate(const Recording& recording, const CalibrateOptions& options) {
   return CalibrateRecording(recording, RotationsOfPictures(recording, 200), options);
 }
@@ -148,7 +128,7 @@ TEST(CalibrateAstray, TakesInALensAfterTheFitOfAllPairs) {
 // Where the lens bends nothing, no start makes it bend: one that is wrong by a factor of 3 sends
 // the online estimate as far from it.
 TEST(CalibrateAstray, TakesInNothingThatTheDataDoNotBearOut) {
-  const simulation::Simulated s = simulation::SimulateTracks(Room()).value();
+  const simulation::Simulated s = simulation::SimulateTracks(RoomScenario()).value();
   const auto right = Calibrate(s.recording, {});
   ASSERT_TRUE(right.has_value()) << right.error().message;
   CalibrateOptions options;

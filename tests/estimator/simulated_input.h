@@ -32,6 +32,26 @@ inline simulation::Scenario FarScenario(double duration_s) {
   return scenario;
 }
 
+// 10 s of a room with a camera of 752 x 480.
+inline simulation::Scenario RoomScenario() {
+  simulation::Scenario scenario = ShortScenario(10.0);
+  scenario.camera.width_px = 752;
+  scenario.camera.focal_px = 458.0;
+  scenario.scene.kind = simulation::SceneKind::kRoom;
+  scenario.motion.speed_m_s = 0.8;
+  scenario.motion.path_radius_m = 1.5;
+  scenario.motion.heading_deg = 60.0;
+  return scenario;
+}
+
+// The same with a lens like that of EuRoC's drone.
+inline simulation::Scenario RoomThroughALens() {
+  simulation::Scenario scenario = RoomScenario();
+  scenario.effects.radial_distortion.k1 = -0.28;
+  scenario.effects.radial_distortion.k2 = 0.07;
+  return scenario;
+}
+
 // The truth with the focal length 5 % and the delay 5 ms off, q_gyro_cam by 20 mrad per axis and
 // no bias; the prior is as wide as that of a phone's declaration.
 inline Prior StartOffTheTruth(const Calibration& truth) {
