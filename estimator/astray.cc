@@ -13,6 +13,10 @@ namespace {
 // half of a recording went to 10 px (FindEffects.NamesNothingWithAFocalLengthThatRanAway).
 constexpr double kRunAwayFocal = 2.0;
 
+// Change of the focal length in a round of a fit (log) that is still running away: those of
+// ov_handheld_rs without its lens move by 0.25 to 0.6 in their second round.
+constexpr double kStillRunning = 0.1;
+
 // How far the focal length of a fit may be from that of the rotations at the start (log), and in
 // sigmas of the latter.
 constexpr double kFarFromStart = 0.2, kFarFromStartSigmas = 5.0;
@@ -26,6 +30,10 @@ constexpr double kSeenSigmas = 3.0;
 bool RanAway(double focal_px, double from_px) {
   if (from_px == 0.0) return false;  // of attitudes, which have no lens
   return !(std::abs(std::log(focal_px / from_px)) <= std::log(kRunAwayFocal));
+}
+
+bool IsRunningAway(double before_px, double now_px, double from_px) {
+  return RanAway(now_px, from_px) && !(std::abs(std::log(now_px / before_px)) <= kStillRunning);
 }
 
 bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start) {

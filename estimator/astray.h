@@ -19,6 +19,11 @@ namespace camgyro {
 // have none, which is 0 and stays.
 bool RanAway(double focal_px, double from_px);
 
+// It has, and a round of its fit still moves it by a tenth: such a fit comes to no end. One that
+// began at a wrong focal length gets as far from it, but settles there
+// (FaultsTest.TheLightFlickers: by 1 % in its second round).
+bool IsRunningAway(double before_px, double now_px, double from_px);
+
 // A focal length is far from that of the rotations at the start, if they determine one: a strong
 // lens that nothing declares moves theirs by 7 % (rms, docs/lab/start.md), and a fit's by any
 // factor.

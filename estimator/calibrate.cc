@@ -222,6 +222,10 @@ class CalibrationJob {
     if (online_noise_) refinement.graph.sigma = online_noise_;
     const double duration = input_.pairs.back().time_b_s - input_.pairs.front().time_a_s;
     refinement.cluster_s = std::clamp(duration / 12.0, 0.2, refinement.cluster_s);
+    refinement.is_lost = [from_px = from_start_.lens[kFocal]](const Calibration& before,
+                                                              const Calibration& now, double) {
+      return IsRunningAway(before.lens[kFocal], now.lens[kFocal], from_px);
+    };
     return refinement;
   }
 

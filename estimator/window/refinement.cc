@@ -106,6 +106,10 @@ constexpr double kRoughly = 1e-4;
 
 constexpr int kLeastPairs = 10;
 
+// The first solve has a scale of the noise that is the misfit of the start; the second one shows
+// where a fit goes.
+constexpr int kRoundsToGetLost = 2;
+
 double KeptBytes(const std::vector<TimedPair>& pairs, const PairGraphOptions& options) {
   double bytes = 0.0;
   for (const TimedPair& pair : pairs) {
@@ -160,7 +164,8 @@ class Refinement {
       const auto residuals = AllResiduals(/*search=*/false);
       const Noise next = NextNoise(residuals);
       result_.calibration = graph_->Estimate();
-      const bool last = result_.rounds == options_.max_rounds;
+      const bool lost = IsLost(before, next.scale);
+      const bool last = lost || result_.rounds == options_.max_rounds;
       scale_settled_ = SameNoise(next) && spread_settled;
       if (!scale_settled_ && !last) {
         SetNoise(next);
@@ -173,7 +178,7 @@ class Refinement {
       if (const Status judged = Judge(before, residuals); !judged) {
         return tl::unexpected(judged.error());
       }
-      if (result_.converged) break;
+      if (result_.converged || lost) break;
     }
     result_.latents = std::make_shared<PairLatents>(graph_->Latents());
     for (size_t i = 0; i < ids_.size(); ++i) result_.noise_factors[ids_[i]] = noise_now_.factors[i];
@@ -217,6 +222,11 @@ class Refinement {
     for (const int64_t id : ids_) noise_now_.factors.push_back(factors.at(id));
     SetNoise(noise_now_);
     return {};
+  }
+
+  bool IsLost(const Calibration& before, double noise) const {
+    return result_.rounds >= kRoundsToGetLost && options_.is_lost &&
+           options_.is_lost(before, result_.calibration, noise);
   }
 
   // The scale at the start, misfit included, so that a poor start is not cut off by the loss;

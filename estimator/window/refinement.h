@@ -3,6 +3,7 @@
 #define CAMGYRO_ESTIMATOR_WINDOW_REFINEMENT_H_
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -42,6 +43,10 @@ struct RefinementOptions {
   // from the last step to the covariance, unless they are larger than this: those of some minutes
   // of recording. Longer ones need their memory for Ceres' copies of them.
   double most_kept_bytes = 128e6;
+  // Asked after the second round and each that follows, with the estimates before and after it and
+  // the scale of the noise: a fit that is lost ends there. It would take all rounds, and the
+  // longest. Empty: none is.
+  std::function<bool(const Calibration& before, const Calibration& now, double noise)> is_lost;
   // Of a fit that has settled, whose result and noise this one starts from; null: of none.
   std::shared_ptr<const PairLatents> latents;
 };

@@ -31,6 +31,15 @@ TEST(Astray, AFocalLengthRunsAwayByAFactorOfTwo) {
   EXPECT_FALSE(RanAway(0.0, 0.0));  // of attitudes
 }
 
+TEST(Astray, AFocalLengthIsStillRunning) {
+  EXPECT_TRUE(IsRunningAway(1000.0, 1300.0, 450.0));
+  EXPECT_TRUE(IsRunningAway(250.0, 200.0, 450.0));
+  EXPECT_FALSE(IsRunningAway(1000.0, 1050.0, 450.0));  // it settles there
+  EXPECT_FALSE(IsRunningAway(600.0, 800.0, 450.0));
+  EXPECT_TRUE(IsRunningAway(1000.0, std::nan(""), 450.0));
+  EXPECT_FALSE(IsRunningAway(0.0, 0.0, 0.0));  // of attitudes
+}
+
 TEST(Astray, AFocalLengthIsFarFromThatOfTheRotations) {
   std::optional<StartFocal> start;
   EXPECT_FALSE(IsFarFromRotations(3000.0, start));

@@ -179,6 +179,35 @@ TEST(Refinement, GoesOnFromAnotherFit) {
 
 // Motion blur: noise along the motion five times that across. Taken for alike in all directions,
 // the correction for errors in variables is wrong; the factor makes it right.
+// Asked from the second round on. What there is then has its covariance and its quality.
+TEST(Refinement, EndsWhereItIsLost) {
+  const Simulated s = SimulateTracks(ShortScenario(4.0)).value();
+  const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  const Prior start = StartOffTheTruth(s.truth);
+  for (const bool lost : {false, true}) {
+    int asked = 0;
+    double noise_px = 0.0;
+    RefinementOptions options;
+    options.is_lost = [&](const Calibration&, const Calibration&, double noise) {
+      ++asked;
+      noise_px = noise;
+      return lost;
+    };
+    const Result<Refined> refined = Refine(input, input.pairs, start.mean, start, options);
+    ASSERT_TRUE(refined.has_value()) << refined.error().message;
+    EXPECT_EQ(asked, refined->rounds - 1);
+    EXPECT_NEAR(noise_px, 0.7, 0.05);
+    EXPECT_GT(refined->quality.pairs, 0);
+    EXPECT_GT(refined->calibration.sigma()[kStateFocal], 0.0);
+    EXPECT_EQ(refined->converged, !lost);
+    if (lost) {
+      EXPECT_EQ(refined->rounds, 2);
+    } else {
+      EXPECT_GT(refined->rounds, 2);
+    }
+  }
+}
+
 TEST(Refinement, NoiseAlongTheMotionIsNoBiasIfItIsKnown) {
   Scenario scenario = ShortScenario(10.0);
   scenario.tracks.count = 100;
