@@ -134,6 +134,11 @@ std::optional<LargeStep> FindLargeStep(const EstimationInput& input,
                                        const Calibration& calibration, double noise,
                                        const PairGraphOptions& options) {
   const double scan_noise = ScanNoise(blocks, noise);
+  // Frames' own times would take a part of a step for themselves, and are searched for each delay.
+  Calibration at_stamps = calibration;
+  if (calibration.effects && calibration.effects->frame_time_spread() >= 0) {
+    at_stamps.effect_values[calibration.effects->frame_time_spread()] = 0.0;
+  }
   std::vector<BlockCosts> of_blocks(blocks.size());
   ParallelFor(blocks.size(), [&](size_t b) {
     const PairBlock& block = blocks[b];
@@ -141,7 +146,7 @@ std::optional<LargeStep> FindLargeStep(const EstimationInput& input,
     const size_t stride = (block.size() + kScanPairs - 1) / kScanPairs;
     for (size_t i = 0; i < block.size(); i += stride) {
       const auto scores_at = [&](double delay_s) {
-        Calibration with = calibration;
+        Calibration with = at_stamps;
         with.delay_s = delay_s;
         return ComputeScores(input, {{block[i]}}, with, nullptr, scan_noise, options);
       };

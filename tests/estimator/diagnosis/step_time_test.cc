@@ -74,7 +74,8 @@ TEST_F(StepTime, IsInTheMiddleOfFramesThatNoPairHas) {
   EXPECT_NEAR(Place(pairs, "5.1"), 0.5 * (last_before_s + first_after_s), 0.04);
 }
 
-// Whether the calibration has the delay before it or after it.
+// Whether the calibration has the delay before it or after it, and also where frames have times of
+// their own, which would take the step for themselves.
 TEST_F(StepTime, OfALargeStepIsBetweenTheBlocks) {
   std::vector<PairBlock> blocks(5);
   for (const TimedPair& pair : input_.pairs) {
@@ -83,7 +84,15 @@ TEST_F(StepTime, OfALargeStepIsBetweenTheBlocks) {
     if (at < blocks.size()) blocks[at].push_back(pair);
   }
   const double delay_s = calibration_.delay_s;
-  for (const double off_s : {0.0, 0.01}) {
+  auto own_times = std::make_shared<EffectSet>();
+  const EffectEntry* jitter = FindEffect("frame_stamp_jitter");
+  own_times->Add(jitter, "spread",
+                 jitter->make(MakeEffectSetup(recording_, calibration_), "spread"));
+  for (const double off_s : {0.0, 0.01, 0.0}) {
+    if (calibration_.delay_s > delay_s) {
+      calibration_.effects = own_times;
+      calibration_.effect_values = Eigen::VectorXd::Constant(1, 0.02);
+    }
     calibration_.delay_s = delay_s + off_s;
     const auto step = FindLargeStep(input_, blocks, calibration_, 0.7, options_);
     ASSERT_TRUE(step);
