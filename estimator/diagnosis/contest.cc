@@ -32,6 +32,8 @@ class Contest {
         choice_(*setting.choice),
         delay_moves_(setting.delay_moves),
         noise_(setting.now->quality.noise_px),
+        most_noise_(kMostNoiseOfRival * noise_),
+        ran_away_(RanAway(now_.calibration.lens[kFocal], fits_.in().start.lens[kFocal])),
         all_(*all) {
     const CandidateResult& front = all_.front().result;
     best_gain_ = front.rejected.empty() ? front.gain.sum : 0.0;
@@ -40,16 +42,9 @@ class Contest {
   }
 
   std::optional<ContestResult> Run() {
-    for (size_t next = 0; next < all_.size();) {
-      const std::vector<size_t> together = NextTogether(&next);
-      std::vector<std::optional<Rival>> refitted(together.size());
-      ParallelFor(together.size(), [&](size_t k) {
-        const size_t i = together[k];
-        refitted[k] = all_[i].candidate.widens_prior() ? RefitWidened(i) : RefitRival(i);
-      });
-      for (std::optional<Rival>& rival : refitted) {
-        if (rival) rivals_.push_back(std::move(*rival));
-      }
+    if (ran_away_) RefitWhatLeadsAstray();
+    if (rivals_.empty()) {
+      for (size_t next = 0; next < all_.size();) RefitTogether(NextTogether(&next));
     }
     if (rivals_.empty()) return std::nullopt;
     const size_t winner = Winner();
@@ -70,12 +65,45 @@ class Contest {
   }
 
  private:
+  void RefitTogether(const std::vector<size_t>& together) {
+    std::vector<std::optional<Rival>> refitted(together.size());
+    ParallelFor(together.size(), [&](size_t k) {
+      const size_t i = together[k];
+      refitted[k] = all_[i].candidate.widens_prior() ? RefitWidened(i) : RefitRival(i);
+    });
+    for (std::optional<Rival>& rival : refitted) {
+      if (rival) rivals_.push_back(std::move(*rival));
+    }
+  }
+
+  // Before all others. Where one of these brings the fit back, the others are tested beside it in
+  // the next round: what their linear gains say at the end of a fit that ran away is nothing.
+  void RefitWhatLeadsAstray() {
+    std::vector<size_t> together;
+    for (size_t i = 0; i < all_.size(); ++i) {
+      if (!all_[i].candidate.entry->leads_astray) continue;
+      CandidateResult& r = all_[i].result;
+      r.tried_anyway = !r.rejected.empty();
+      r.rejected.clear();
+      together.push_back(i);
+    }
+    RefitTogether(together);
+    what_led_astray_is_refitted_ = true;
+    if (rivals_.empty()) return;
+    for (Contestant& other : all_) {
+      if (!other.candidate.entry->leads_astray && other.result.rejected.empty()) {
+        other.result.rejected = "asked when the fit is back";
+      }
+    }
+  }
+
   // Contestants from *next on that are refitted whatever comes of those before them here: with
   // each, there is at most one rival more. *next becomes the first of the others.
   std::vector<size_t> NextTogether(size_t* next) {
     std::vector<size_t> together;
     for (; *next < all_.size(); ++*next) {
       if (all_[*next].candidate.is_last_resort()) continue;
+      if (what_led_astray_is_refitted_ && all_[*next].candidate.entry->leads_astray) continue;
       CandidateResult& r = all_[*next].result;
       const bool in_any_case = TriedInAnyCase(*all_[*next].candidate.entry);
       const bool widens = all_[*next].candidate.widens_prior();
@@ -121,17 +149,20 @@ class Contest {
   }
 
   // The better of a fit from the present one and, where the model is astray, one from the start.
+  // With what sends fits away, the end of one that ran away is nowhere to begin from.
   Result<Refined> FitWith(const CandidateResult& r, const Candidate& candidate) const {
     Calibration start = now_.calibration;
     AddEffect(candidate, &start);
     const int columns = candidate.effect->size();
     if (r.start.size() == columns) start.effect_values.tail(columns) = r.start;
     start.delay_s += r.start_delay_change_s;
-    Result<Refined> fit = fits_.Fit(start, noise_);
-    if (!astray_) return fit;
     Calibration anew = fits_.in().start;
     AddEffect(candidate, &anew);
-    const Result<Refined> other = fits_.Fit(anew, fits_.in().noise);
+    const auto from_start = [&] { return fits_.Fit(anew, fits_.in().noise, nullptr, most_noise_); };
+    if (ran_away_ && candidate.entry->leads_astray) return from_start();
+    Result<Refined> fit = fits_.Fit(start, noise_, nullptr, most_noise_);
+    if (!astray_) return fit;
+    const Result<Refined> other = from_start();
     const auto rank = [&](const Refined& f) {
       return std::pair(!ImplausibleByItsLast(f.calibration, fits_.in().start.lens[kFocal]).empty(),
                        f.quality.rms_px);
@@ -143,9 +174,13 @@ class Contest {
   std::optional<Rival> RefitRival(size_t i) {
     auto& [r, candidate] = all_[i];
     Result<Refined> fit = FitWith(r, candidate);
+    if (fit && fit->quality.noise_px > most_noise_) {
+      r.rejected = "with it, the fit leads nowhere";
+      return std::nullopt;
+    }
     if (fit && candidate.entry->step_at && fits_.PlaceSteps(noise_, &fit->calibration)) {
       r.shape = fit->calibration.effects->items().back().shape;
-      fit = fits_.Fit(fit->calibration, noise_, fit->latents);
+      fit = fits_.Fit(fit->calibration, noise_, fit->latents, most_noise_);
     }
     if (!fit) {
       r.rejected = "the fit with it failed: " + fit.error().message;
@@ -211,10 +246,12 @@ class Contest {
   const Refined& now_;
   const Scores& choice_;
   const bool delay_moves_;
-  const double noise_;
+  const double noise_, most_noise_;
+  const bool ran_away_;
   std::vector<Contestant>& all_;
   double best_gain_ = 0.0;
   bool astray_ = false;
+  bool what_led_astray_is_refitted_ = false;
   std::vector<Rival> rivals_;
 };
 

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <utility>
 
+#include "estimator/astray.h"
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
 #include "estimator/window/settle_effects.h"
@@ -55,13 +56,18 @@ std::vector<PairBlock> SharedFits::SeenBlocks() const {
 }
 
 Result<Refined> SharedFits::Fit(const Calibration& start, double noise,
-                                std::shared_ptr<const PairLatents> latents) const {
+                                std::shared_ptr<const PairLatents> latents,
+                                double most_noise) const {
   RefinementOptions refinement = options_.calibrate.refinement;
   refinement.graph = in_.graph;
   refinement.graph.sigma = noise;
   refinement.cluster_s = shares_.block_s;
   refinement.max_rounds = kFitRounds;
   refinement.latents = std::move(latents);
+  refinement.is_lost = [&](const Calibration& before, const Calibration& now, double scale) {
+    return scale > most_noise ||
+           IsRunningAway(before.lens[kFocal], now.lens[kFocal], in_.start.lens[kFocal]);
+  };
   return Refine(input_, Joined(shares_.fit), start, in_.prior, refinement);
 }
 

@@ -2,6 +2,7 @@
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_SHARED_FITS_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_SHARED_FITS_H_
 
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -30,8 +31,10 @@ class SharedFits {
   std::vector<PairBlock> SeenBlocks() const;
 
   // A fit of the fit share. noise: first guess. latents: of a fit of the share near the start.
+  // most_noise: with more, or with a focal length that ran away, the fit is lost and ends early.
   Result<Refined> Fit(const Calibration& start, double noise,
-                      std::shared_ptr<const PairLatents> latents = nullptr) const;
+                      std::shared_ptr<const PairLatents> latents = nullptr,
+                      double most_noise = std::numeric_limits<double>::infinity()) const;
   // Effects that depend on the calibration made anew until it settles.
   Refined Settle(Refined fit) const;
   // Puts steps of the delay where the fit and the choice share have them, to within a pair or a gap
