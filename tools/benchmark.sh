@@ -27,6 +27,7 @@ times() {
     "8 s of 1280 x 720, diagnosed|diagnose $room"
     "ov_corridor_rs, with gyro_scale|calibrate $data/ov_corridor_rs --effects=radial_distortion:radtan,gyro_scale"
     "ov_handheld_rs, 60 s of tracks, diagnosed|diagnose $data/ov_handheld_rs"
+    "phone-edge-hand, 52 s of 640 x 480, diagnosed|diagnose $data/phone-edge-hand"
   )
   TIMEFORMAT='%R %U'
   printf '| Recording | before | after | ratio | processor before | after | ratio |\n'
