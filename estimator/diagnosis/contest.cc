@@ -33,7 +33,8 @@ class Contest {
         delay_moves_(setting.delay_moves),
         noise_(setting.now->quality.noise_px),
         most_noise_(kMostNoiseOfRival * noise_),
-        ran_away_(RanAway(now_.calibration.lens[kFocal], fits_.in().start.lens[kFocal])),
+        ran_away_(setting.first_round &&
+                  RanAway(now_.calibration.lens[kFocal], fits_.in().start.lens[kFocal])),
         all_(*all) {
     const CandidateResult& front = all_.front().result;
     best_gain_ = front.rejected.empty() ? front.gain.sum : 0.0;
