@@ -32,12 +32,13 @@ SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
   };
   const bool reanchored = in.recording->match_noise == MatchNoise::kSecondImage;
   const PairSelection near = SelectPairs(*in.recording, {reanchored ? kNearestGap : kNearGap});
-  map_pairs_ = shares_of(near, {kMostFitPairs, kMostChoicePairs}).choice;
+  map_pairs_ = shares_of(near, {kMostFitPairs, kMostChoicePairs, /*with_report=*/false}).choice;
   if (in.recording->HasOnlyAttitudes()) return;
   // So that no two of them share noise: as far apart as the others, and where a tracker re-anchors,
   // one after the other.
   const int stride = reanchored ? kNearestGap : SelectPairs(*in.recording).stride;
-  const Shares nearest = shares_of({kNearestGap, stride}, {kMostFitPairs, kMostFitPairs});
+  const Shares nearest =
+      shares_of({kNearestGap, stride}, {kMostFitPairs, kMostFitPairs, /*with_report=*/false});
   near_pairs_ = Joined(nearest.fit);
   const std::vector<TimedPair> choice = Joined(nearest.choice);
   near_pairs_.insert(near_pairs_.end(), choice.begin(), choice.end());

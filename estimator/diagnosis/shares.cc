@@ -48,6 +48,7 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input,
   shares.block_s =
       std::max(std::clamp(duration_s / kBlocksPerRecording, kShortestBlockS, kLongestBlockS),
                kLeastFramesOfBlock * MedianInterval(recording.frames));
+  shares.block_s = std::max(shares.block_s, duration_s / kMostBlocks);
   const auto block_of = [&](double time_s) {
     return static_cast<int64_t>(std::floor((time_s - begin_s) / shares.block_s));
   };

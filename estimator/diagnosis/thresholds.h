@@ -13,6 +13,9 @@ namespace camgyro {
 // frames: short enough that what changes with time is seen by all shares, long enough for pairs.
 constexpr double kBlocksPerRecording = 40.0;
 constexpr double kShortestBlockS = 0.2, kLongestBlockS = 3.0;
+// The scores of a block are 0.15 MB for all candidates, 0.7 MB for the maps: at most so many
+// blocks, which 15 minutes have of 3 s.
+constexpr double kMostBlocks = 300.0;
 constexpr double kLeastFramesOfBlock = 6.0;
 // Pairs of the report share that have matches of their own tracks, below which it shares tracks.
 constexpr size_t kLeastReportPairs = 20;

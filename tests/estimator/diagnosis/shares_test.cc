@@ -53,6 +53,28 @@ TEST(Shares, WithoutReportTheOthersAreTheSame) {
   EXPECT_FALSE(without.fit.front().front().matches.empty());
 }
 
+// Each holds scores of all candidates: an hour has no more than a quarter of it.
+TEST(Shares, HaveNoMoreBlocksInAnHour) {
+  Recording recording;
+  EstimationInput input;
+  for (int i = 0; i < 36000; ++i) {
+    recording.frames.emplace_back().stamp_ns = static_cast<int64_t>(i) * 100'000'000;
+    if (i == 0) continue;
+    TimedPair pair;
+    pair.frame_a = i - 1;
+    pair.frame_b = i;
+    pair.time_a_s = 0.1 * pair.frame_a;
+    pair.time_b_s = 0.1 * pair.frame_b;
+    input.pairs.push_back(pair);
+  }
+  recording.tracks.resize(recording.frames.size());
+  const Shares shares = MakeShares(recording, input);
+  EXPECT_NEAR(shares.block_s, 12.0, 0.01);
+  const size_t blocks = shares.fit.size() + shares.choice.size() + shares.report.size();
+  EXPECT_LE(blocks, 300u);
+  EXPECT_GT(blocks, 290u);
+}
+
 TEST(Shares, NoTrackOfTheReportIsInAnotherShare) {
   const Recording recording = Tracks(15.0);
   const Shares shares = MakeShares(recording, MakeEstimationInput(recording));
