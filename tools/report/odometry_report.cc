@@ -114,6 +114,17 @@ std::string PathSvg(const PathView& view, const OdometryRun& run, const LoopClos
          "<g class=\"start\">" + ends + "</g>" + bar + "</svg></figure>\n";
 }
 
+// A chart is some 600 pixels wide; an hour has 108000 poses.
+constexpr size_t kMostPosesOfChart = 5000;
+
+// Every n-th.
+std::vector<const OdometryPose*> PosesOfChart(const std::vector<OdometryPose>& poses) {
+  const size_t stride = (poses.size() + kMostPosesOfChart - 1) / kMostPosesOfChart;
+  std::vector<const OdometryPose*> shown;
+  for (size_t i = 0; i < poses.size(); i += stride) shown.push_back(&poses[i]);
+  return shown;
+}
+
 using Component = double (*)(const OdometryPose& pose, int axis);
 
 LineChart Chart(const OdometryRun& run, const std::string& id, const std::string& title,
@@ -125,16 +136,17 @@ LineChart Chart(const OdometryRun& run, const std::string& id, const std::string
   chart.y_label = unit;
   chart.group = "time";
   const int64_t begin_ns = run.poses.front().time_ns;
-  for (const OdometryPose& pose : run.poses) {
-    chart.x.push_back(SecondsSince(begin_ns, pose.time_ns));
+  const std::vector<const OdometryPose*> poses = PosesOfChart(run.poses);
+  for (const OdometryPose* pose : poses) {
+    chart.x.push_back(SecondsSince(begin_ns, pose->time_ns));
   }
   constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
   for (int axis = 0; axis < 3; ++axis) {
     ChartSeries series;
     series.name = kAxes[static_cast<size_t>(axis)];
-    for (const OdometryPose& pose : run.poses) {
-      series.y.push_back(value(pose, axis));
-      if (sigma != nullptr) series.band.push_back(3.0 * sigma(pose, axis));
+    for (const OdometryPose* pose : poses) {
+      series.y.push_back(value(*pose, axis));
+      if (sigma != nullptr) series.band.push_back(3.0 * sigma(*pose, axis));
     }
     chart.series.push_back(std::move(series));
   }
