@@ -19,6 +19,18 @@ using Eigen::Vector3d;
 // Points further away than this many times the path's size would make it a dot.
 constexpr double kShownPoints = 1.0;
 
+// Charts and views are some 600 pixels wide; an hour has a hundred thousand poses and landmarks.
+constexpr size_t kMostShown = 5000;
+
+// Every n-th.
+template <typename T>
+std::vector<const T*> Shown(const std::vector<T>& all) {
+  const size_t stride = (all.size() + kMostShown - 1) / kMostShown;
+  std::vector<const T*> shown;
+  for (size_t i = 0; i < all.size(); i += stride) shown.push_back(&all[i]);
+  return shown;
+}
+
 // A projection of the world: the path with the landmarks around it.
 struct PathView {
   std::string title;
@@ -80,8 +92,8 @@ std::string PathSvg(const PathView& view, const OdometryRun& run, const LoopClos
   const Vector2d size = high - low;
   const double unit = size.maxCoeff() / 600.0;
   std::string points;
-  for (const MappedPoint& point : run.points) {
-    const Vector2d p = OnView(view, point.p_world_m);
+  for (const MappedPoint* point : Shown(run.points)) {
+    const Vector2d p = OnView(view, point->p_world_m);
     const Vector2d outside = (p - 0.5 * (low + high)).cwiseAbs() - kShownPoints * 0.5 * size;
     if (outside.maxCoeff() > 0.0) continue;
     points += Format("<circle cx=\"%.3f\" cy=\"%.3f\" r=\"%.3f\"/>", p.x(), p.y(), unit);
@@ -114,17 +126,6 @@ std::string PathSvg(const PathView& view, const OdometryRun& run, const LoopClos
          "<g class=\"start\">" + ends + "</g>" + bar + "</svg></figure>\n";
 }
 
-// A chart is some 600 pixels wide; an hour has 108000 poses.
-constexpr size_t kMostPosesOfChart = 5000;
-
-// Every n-th.
-std::vector<const OdometryPose*> PosesOfChart(const std::vector<OdometryPose>& poses) {
-  const size_t stride = (poses.size() + kMostPosesOfChart - 1) / kMostPosesOfChart;
-  std::vector<const OdometryPose*> shown;
-  for (size_t i = 0; i < poses.size(); i += stride) shown.push_back(&poses[i]);
-  return shown;
-}
-
 using Component = double (*)(const OdometryPose& pose, int axis);
 
 LineChart Chart(const OdometryRun& run, const std::string& id, const std::string& title,
@@ -136,7 +137,7 @@ LineChart Chart(const OdometryRun& run, const std::string& id, const std::string
   chart.y_label = unit;
   chart.group = "time";
   const int64_t begin_ns = run.poses.front().time_ns;
-  const std::vector<const OdometryPose*> poses = PosesOfChart(run.poses);
+  const std::vector<const OdometryPose*> poses = Shown(run.poses);
   for (const OdometryPose* pose : poses) {
     chart.x.push_back(SecondsSince(begin_ns, pose->time_ns));
   }

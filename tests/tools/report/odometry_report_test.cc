@@ -14,7 +14,10 @@ OdometryRun RunOf(double seconds) {
     pose.time_ns = static_cast<int64_t>(i) * 33'333'333;
     pose.state.p_world_m = Eigen::Vector3d(0.1234567 * i, 0.7654321, 0.3);
     run.poses.push_back(pose);
-    if (i % 300 == 0) run.keyframes.push_back(pose);
+    if (i % 9 == 0) run.keyframes.push_back(pose);
+    MappedPoint point;
+    point.p_world_m = pose.state.p_world_m + Eigen::Vector3d(0.1, 1.23456, 0.7);
+    run.points.push_back(point);
   }
   return run;
 }
