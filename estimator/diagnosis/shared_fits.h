@@ -31,7 +31,8 @@ class SharedFits {
   std::vector<PairBlock> SeenBlocks() const;
 
   // A fit of the fit share. noise: first guess. latents: of a fit of the share near the start.
-  // most_noise: with more, or with a focal length that ran away, the fit is lost and ends early.
+  // most_noise: with more, or with a focal length that is running away, the fit is lost and ends
+  // early.
   Result<Refined> Fit(const Calibration& start, double noise,
                       std::shared_ptr<const PairLatents> latents = nullptr,
                       double most_noise = std::numeric_limits<double>::infinity()) const;

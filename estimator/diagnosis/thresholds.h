@@ -64,8 +64,8 @@ constexpr double kHardlyAnyLoss = 0.1;  // of the gain, lost in the stretches th
 constexpr double kLeastGainOfRival = 0.25;
 // A rival contains the fit without it, whose noise it cannot exceed: one that does by this factor
 // after two rounds leads nowhere. Of the rivals of phone-edge-hand and ov_handheld_rs, those that
-// settle are at 1.03 of it at most, steps of the delay that are none at 2.3
-// (FindEffects.GivesUpARivalThatLeadsNowhere).
+// settle are at 1.03 of it at most, steps of the delay that are none at 2.4 and more (by prints
+// that are not in the program; Contest.GivesUpARivalThatLeadsNowhere).
 constexpr double kMostNoiseOfRival = 1.5;
 // A linear gain of one effect over chi2, beyond which the model is so far off that it says little
 // (FindEffects.ChoosesTheSeriesOfAWideLens).
