@@ -8,6 +8,7 @@
 #include "core/time.h"
 #include "estimator/diagnosis/thresholds.h"
 #include "estimator/window/pair_graph.h"
+#include "estimator/window/pair_selection.h"
 
 namespace camgyro {
 namespace {
@@ -31,6 +32,15 @@ void Thin(size_t most, std::vector<PairBlock>* blocks) {
   }
 }
 
+// The length of a stretch. It is of the recording, so that pairs of any gap have the same blocks.
+double LengthOfBlock(const Recording& recording, double duration_s) {
+  const double interval_s = MedianInterval(recording.frames);
+  return std::max({std::clamp(duration_s / kBlocksPerRecording, kShortestBlockS, kLongestBlockS),
+                   kLeastFramesOfBlock * interval_s,
+                   kLeastPairsOfBlock * SelectPairs(recording).gap * interval_s,
+                   duration_s / kMostBlocks});
+}
+
 void AddMatches(const Recording& recording, std::vector<PairBlock>* blocks) {
   for (PairBlock& block : *blocks) AddMatches(recording, &block);
 }
@@ -41,14 +51,10 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input,
                   const ShareLimits& limits) {
   Shares shares;
   if (input.pairs.empty()) return shares;
-  // Of the frames, so that pairs of any gap have the same blocks.
   const double begin_s = SecondsSince(input.origin_ns, recording.frames.front().stamp_ns);
   const double duration_s =
       SecondsSince(input.origin_ns, recording.frames.back().stamp_ns) - begin_s;
-  shares.block_s =
-      std::max(std::clamp(duration_s / kBlocksPerRecording, kShortestBlockS, kLongestBlockS),
-               kLeastFramesOfBlock * MedianInterval(recording.frames));
-  shares.block_s = std::max(shares.block_s, duration_s / kMostBlocks);
+  shares.block_s = LengthOfBlock(recording, duration_s);
   const auto block_of = [&](double time_s) {
     return static_cast<int64_t>(std::floor((time_s - begin_s) / shares.block_s));
   };

@@ -17,6 +17,9 @@ constexpr double kShortestBlockS = 0.2, kLongestBlockS = 3.0;
 // blocks, which 15 minutes have of 3 s.
 constexpr double kMostBlocks = 300.0;
 constexpr double kLeastFramesOfBlock = 6.0;
+// And it is so many times as long as a pair, since pairs across its ends are in no share: of two,
+// half of them stay. Where nothing is near, pairs span 0.8 s (SelectPairs).
+constexpr double kLeastPairsOfBlock = 2.0;
 // Pairs of the report share that have matches of their own tracks, below which it shares tracks.
 constexpr size_t kLeastReportPairs = 20;
 

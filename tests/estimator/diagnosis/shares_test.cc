@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "estimator/diagnosis/thresholds.h"
 #include "simulation/simulate.h"
 
 namespace camgyro {
@@ -73,6 +74,26 @@ TEST(Shares, HaveNoMoreBlocksInAnHour) {
   const size_t blocks = shares.fit.size() + shares.choice.size() + shares.report.size();
   EXPECT_LE(blocks, 300u);
   EXPECT_GT(blocks, 290u);
+}
+
+// Of a turn on the spot, pairs are long (SelectPairs), and stretches, too: half of the pairs stay.
+TEST(Shares, HaveRoomForLongPairs) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 14.0;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRotation);
+  const auto simulated = simulation::SimulateTracks(scenario);
+  ASSERT_TRUE(simulated);
+  const Recording& recording = simulated->recording;
+  const PairSelection selection = SelectPairs(recording);
+  const double pair_s = selection.gap * MedianInterval(recording.frames);
+  ASSERT_GT(pair_s, kLeastFramesOfBlock * MedianInterval(recording.frames));
+  const EstimationInput input = OutlineOf(recording, selection);
+  const Shares shares = MakeShares(recording, input);
+  EXPECT_GE(shares.block_s, 2.0 * pair_s);
+  EXPECT_GT(Joined(shares.fit).size(), 40u);
+  EXPECT_GT(Joined(shares.choice).size(), 40u);
+  // Pairs of another gap have the same stretches.
+  EXPECT_EQ(MakeShares(recording, OutlineOf(recording)).block_s, shares.block_s);
 }
 
 TEST(Shares, NoTrackOfTheReportIsInAnotherShare) {
