@@ -60,16 +60,6 @@ struct RoundScores {
   Eigen::VectorXd prior;  // information, of all columns
 };
 
-// Of each share by the other's step, by block; halved, to compare with a refit's gain in one.
-std::vector<double> GainOfColumns(const RoundScores& round, const std::vector<int>& columns) {
-  std::vector<double> gain = GainOfStep(round.choice, StepOf(round.fit, columns, round.prior));
-  const std::vector<double> other =
-      GainOfStep(round.fit, StepOf(round.choice, columns, round.prior));
-  gain.insert(gain.end(), other.begin(), other.end());
-  for (double& g : gain) g *= 0.5;
-  return gain;
-}
-
 // Candidates with parameters in the catalogue's order. `usual` becomes what their scatters have in
 // common.
 std::vector<Contestant> TestCandidates(const RoundScores& round, Scatter* usual) {
@@ -79,12 +69,13 @@ std::vector<Contestant> TestCandidates(const RoundScores& round, Scatter* usual)
     alone.push_back(TestColumns(round.both, candidate.columns(), round.prior));
   }
   *usual = UsualScatter(alone);
-  const std::vector<double> without = GainOfColumns(round, {});
+  const std::vector<double> without = GainAcross(round.fit, round.choice, {}, round.prior);
   std::vector<Contestant> all;
   for (const Candidate& candidate : round.candidates) {
     if (candidate.widens_prior()) continue;
     const ScoreTest test = TestColumns(round.both, candidate.columns(), round.prior, *usual);
-    std::vector<double> gain = GainOfColumns(round, candidate.columns());
+    std::vector<double> gain =
+        GainAcross(round.fit, round.choice, candidate.columns(), round.prior);
     for (size_t i = 0; i < gain.size(); ++i) gain[i] -= without[i];
     all.push_back({MakeResult(candidate, test, SumOf(gain)), candidate});
     all.back().result.start = StepOf(round.fit, candidate.columns(), round.prior)

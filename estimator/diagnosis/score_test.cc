@@ -296,6 +296,17 @@ std::vector<double> GainOfStep(const Scores& scores, const Eigen::VectorXd& step
   return gains;
 }
 
+std::vector<double> GainAcross(const Scores& first, const Scores& second,
+                               const std::vector<int>& columns,
+                               const Eigen::VectorXd& prior_information) {
+  std::vector<double> gains = GainOfStep(second, StepOf(first, columns, prior_information));
+  const std::vector<double> of_first =
+      GainOfStep(first, StepOf(second, columns, prior_information));
+  gains.insert(gains.end(), of_first.begin(), of_first.end());
+  for (double& gain : gains) gain *= 0.5;
+  return gains;
+}
+
 double AliasOf(const Scores& scores, const std::vector<int>& first, const std::vector<int>& second,
                const Eigen::VectorXd& prior_information) {
   std::vector<int> both = first;

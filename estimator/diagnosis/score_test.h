@@ -71,6 +71,12 @@ Gain SumOf(const std::vector<double>& gain_by_block);
 // Fall of chi2 in each block if the parameters change by `step`.
 std::vector<double> GainOfStep(const Scores& scores, const Eigen::VectorXd& step);
 
+// Of each share of the data by the other's step (StepOf), by block, those of `second` first.
+// Halved, to compare with a gain in one of them.
+std::vector<double> GainAcross(const Scores& first, const Scores& second,
+                               const std::vector<int>& columns,
+                               const Eigen::VectorXd& prior_information);
+
 // Cosine between two effects: correlation of their estimates' directions after the model's
 // columns are projected out (canonical, the largest; with its sign if both have one parameter);
 // near 1 or -1: this motion cannot tell them apart.

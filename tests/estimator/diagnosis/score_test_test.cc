@@ -198,6 +198,28 @@ TEST(ScoreTest, AFalseStepIsNotSignificant) {
   EXPECT_LE(found, 9);  // 3 expected
 }
 
+// What both shares have, either gains by the other's step: half of the statistic. What one has and
+// the other has turned round, neither does.
+TEST(ScoreTest, AShareGainsByTheOthersStepIfBothHaveTheEffect) {
+  Eigen::VectorXd truth = Eigen::VectorXd::Zero(kStateSize + 3);
+  truth[kStateSize + 1] = 0.1;
+  const std::vector<int> columns = {kStateSize + 1};
+  const auto gain_beside_model = [&](const Scores& first, const Scores& second) {
+    std::vector<double> gain = GainAcross(first, second, columns, WeakPrior());
+    const std::vector<double> without = GainAcross(first, second, {}, WeakPrior());
+    EXPECT_EQ(gain.size(), first.blocks.size() + second.blocks.size());
+    for (size_t i = 0; i < gain.size(); ++i) gain[i] -= without[i];
+    return SumOf(gain);
+  };
+  const Scores first = LinearScores(1, truth), second = LinearScores(2, truth);
+  const Gain gain = gain_beside_model(first, second);
+  const double of_alone = TestColumns(first, columns, WeakPrior()).statistic +
+                          TestColumns(second, columns, WeakPrior()).statistic;
+  EXPECT_NEAR(gain.sum, 0.5 * of_alone, 3.0 * gain.sigma);
+  EXPECT_GT(gain.sum, 3.0 * gain.sigma);
+  EXPECT_LT(gain_beside_model(first, LinearScores(2, -truth)).sum, 0.0);
+}
+
 TEST(ScoreTest, KnowsWhatCannotBeToldApart) {
   Scores scores = LinearScores(7, Eigen::VectorXd::Zero(kStateSize + 3));
   EXPECT_LT(AliasOf(scores, {kStateSize}, {kStateSize + 1}, WeakPrior()), 0.3);
