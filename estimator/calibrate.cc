@@ -296,7 +296,11 @@ class CalibrationJob {
     report_.calibration = refined->calibration;
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;
-    report_.frame_times = TimesOfAllFrames(recording_, *refined, refinement);
+    report_.frame_times =
+        options_.times_between
+            ? TimesOfAllFrames(recording_, refined->calibration, refined->frame_times,
+                               refined->quality.noise_px, refinement.graph)
+            : refined->frame_times;
     if (refined->frame_wander.slow_s > 0.0) {
       report_.notes.push_back(Describe(refined->frame_wander));
     }

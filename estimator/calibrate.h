@@ -37,6 +37,9 @@ struct CalibrateOptions {
   // effect of the catalogue that leads fits so far (EffectEntry::leads_astray: the lens's
   // distortion), and taken if the data bear it out.
   bool try_what_leads_astray = true;
+  // Frames that no pair of the refinement has get times of their own, too, where frames have such
+  // (TimesOfAllFrames).
+  bool times_between = true;
   FocalScanOptions focal_scan;
   SlidingWindowOptions window;  // its graph is that of the refinement, too
   RefinementOptions refinement;

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "estimator/window/estimation_input.h"
 #include "estimator/window/pair_graph.h"
+#include "estimator/window/refinement.h"
 
 namespace camgyro {
 namespace {
@@ -42,38 +43,40 @@ EstimationInput PartOf(const EstimationInput& input, size_t first, size_t end,
 
 }  // namespace
 
-std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Refined& fit,
-                                          const RefinementOptions& options) {
+std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Calibration& fit,
+                                          const std::vector<FrameOffset>& of_pairs, double noise_px,
+                                          const PairGraphOptions& graph) {
   // Of the calibration's sigmas: what is a frame's own moves nothing else.
   constexpr double kHeld = 1e-3;
   // The calibration and the times of the frames in pairs are known; what is left are directions and
   // times.
   constexpr int kRounds = 3;
-  const PairSelection selection = SelectPairs(recording);
-  if (fit.frame_times.empty() || !selection.leaves_frames_out()) return fit.frame_times;
+  if (of_pairs.empty() || !SelectPairs(recording).leaves_frames_out()) return of_pairs;
 
   const EstimationInput input = OutlineOf(recording, PairSelection());
   auto times = std::make_shared<PairLatents>();
-  times->frame_times_s = fit.latents->frame_times_s;
-  RefinementOptions with = options;
+  std::map<int64_t, FrameOffset> all;  // by frame
+  for (const FrameOffset& frame : of_pairs) {
+    all[frame.frame] = frame;
+    times->frame_times_s[frame.frame] = frame.offset_s;
+  }
+  RefinementOptions with;
+  with.graph = graph;
   with.max_rounds = kRounds;
   with.frame_times_alone = true;
   with.latents = std::move(times);
-  with.graph.sigma = fit.quality.noise_px;
-  const Calibration& c = fit.calibration;
-  const Prior held = {c, kHeld * c.sigma(),
-                      kHeld * c.effect_covariance.diagonal().cwiseMax(1e-24).cwiseSqrt()};
+  with.graph.sigma = noise_px;
+  const Prior held = {fit, kHeld * fit.sigma(),
+                      kHeld * fit.effect_covariance.diagonal().cwiseMax(1e-24).cwiseSqrt()};
 
-  std::map<int64_t, FrameOffset> all;  // by frame
-  for (const FrameOffset& frame : fit.frame_times) all[frame.frame] = frame;
   std::vector<std::vector<FrameOffset>> of_stretches((input.pairs.size() + kStretch - 1) /
                                                      kStretch);
   ParallelFor(of_stretches.size(), [&](size_t k) {
     const size_t first = k * kStretch, end = std::min(first + kStretch, input.pairs.size());
     EstimationInput part = PartOf(input, first - std::min(first, kShared),
-                                  std::min(end + kShared, input.pairs.size()), fit.calibration);
+                                  std::min(end + kShared, input.pairs.size()), fit);
     AddMatches(recording, &part.pairs);
-    const Result<Refined> refined = Refine(part, part.pairs, fit.calibration, held, with);
+    const Result<Refined> refined = Refine(part, part.pairs, fit, held, with);
     if (!refined) return;
     const int64_t own_from = PairGraph::FrameNumber(input.pairs[first].time_a_s);
     const int64_t own_to = PairGraph::FrameNumber(input.pairs[end - 1].time_b_s);

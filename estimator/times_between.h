@@ -4,19 +4,22 @@
 
 #include <vector>
 
+#include "core/calibration.h"
 #include "core/recording.h"
 #include "estimator/window/frame_times.h"
-#include "estimator/window/refinement.h"
+#include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
 
 // Own times of all frames (frame_stamp_jitter), also of those that SelectPairs leaves out: found
 // from the pairs of neighbours, stretch by stretch, with lens, shutter, mounting, bias and effects
-// held where `fit` has them, and its times as a start. Their sigmas are those of a frame's time
-// beside a calibration that is known. options: those of the fit. Returns the times of the fit where
-// it leaves no frame out or has no times, and in stretches whose neighbours cannot be fitted.
-std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Refined& fit,
-                                          const RefinementOptions& options);
+// held where the fit has them, and its times as a start. Their sigmas are those of a frame's time
+// beside a calibration that is known. of_pairs: the fit's times (Refined::frame_times), which come
+// back as they are where it leaves no frame out or has none, and in stretches whose neighbours
+// cannot be fitted. noise_px: of the fit; graph: its options.
+std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Calibration& fit,
+                                          const std::vector<FrameOffset>& of_pairs, double noise_px,
+                                          const PairGraphOptions& graph);
 
 }  // namespace camgyro
 

@@ -6,6 +6,7 @@
 #include "estimator/astray.h"
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
+#include "estimator/times_between.h"
 
 namespace camgyro {
 namespace {
@@ -49,6 +50,7 @@ Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAt& rotations_a
   // The loop finds what leads fits astray by itself, and shows what it gains in unseen frames.
   CalibrateOptions plain = options;
   plain.try_what_leads_astray = false;
+  plain.times_between = false;  // AddTimesBetween
   Result<CalibrationReport> report =
       CalibrateRecording(*recording, rotations_at, plain, Part(progress, 0.0, 1.0));
   if (report || report.error().kind != ErrorKind::kCannotEstimate) return report;
@@ -106,10 +108,21 @@ void CalibrateWith(const Calibration& found, const LoopInput& input,
   }
 }
 
-}  // namespace
+// Of the plain fit, where it is the result: the times of frames in between take as long as a fit,
+// and one with effects finds them anew.
+void AddTimesBetween(const Recording& recording, const DiagnoseOptions& options,
+                     Diagnosis* diagnosis) {
+  if (!diagnosis->before || diagnosis->after) return;
+  CalibrationReport& report = *diagnosis->before;
+  report.frame_times =
+      TimesOfAllFrames(recording, report.calibration, report.frame_times, report.quality.noise_px,
+                       GraphOptionsFor(recording, report.start, options.calibrate.window.graph));
+}
 
-Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
-                   const DiagnoseOptions& options, const Progress& progress) {
+// All but the times of frames in between. Repairs the recording (RepairGyro).
+Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOptions& options,
+                       const Progress& progress, Recording* repaired) {
+  Recording& recording = *repaired;
   Diagnosis diagnosis;
   diagnosis.faults = FindDataFaults(recording);
   const Result<CalibrationReport> before =
@@ -156,6 +169,15 @@ Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
     CalibrateWith(*found, input, rotations_at, options, progress, &diagnosis);
     clock.Finish("refinement with effects");
   }
+  return diagnosis;
+}
+
+}  // namespace
+
+Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
+                   const DiagnoseOptions& options, const Progress& progress) {
+  Diagnosis diagnosis = DiagnoseFits(rotations_at, options, progress, &recording);
+  AddTimesBetween(recording, options, &diagnosis);
   return diagnosis;
 }
 

@@ -52,6 +52,11 @@ Fitted Fit(simulation::MotionKind motion, double noise_px, const std::string& ef
   return f;
 }
 
+std::vector<FrameOffset> TimesOf(const Fitted& f) {
+  return TimesOfAllFrames(f.s.recording, f.fit.calibration, f.fit.frame_times,
+                          f.fit.quality.noise_px, f.options.graph);
+}
+
 // 12 s are three stretches.
 TEST(TimesOfAllFrames, AreThoseOfFramesThatNoPairHas) {
   using simulation::MotionKind;
@@ -79,7 +84,7 @@ TEST(TimesOfAllFrames, AreThoseOfFramesThatNoPairHas) {
     for (size_t i = 0; i < f.s.frames.size(); ++i) {
       truth_s[f.s.recording.frames[i].stamp_ns - origin_ns] = f.s.frames[i].delay_s;
     }
-    const std::vector<FrameOffset> times = TimesOfAllFrames(f.s.recording, f.fit, f.options);
+    const std::vector<FrameOffset> times = TimesOf(f);
     EXPECT_TRUE(std::is_sorted(times.begin(), times.end(),
                                [](const auto& a, const auto& b) { return a.frame < b.frame; }));
     double errors_sq = 0.0, sum_sq = 0.0;
@@ -111,7 +116,7 @@ TEST(TimesOfAllFrames, AreThoseOfFramesThatNoPairHas) {
 TEST(TimesOfAllFrames, AreThoseOfTheFitWhereItLeavesNoFrameOut) {
   Fitted f = Fit(simulation::MotionKind::kHandheld, 0.1, "frame_stamp_jitter");
   f.s.recording.match_noise = MatchNoise::kBothImages;
-  EXPECT_EQ(TimesOfAllFrames(f.s.recording, f.fit, f.options).size(), f.fit.frame_times.size());
+  EXPECT_EQ(TimesOf(f).size(), f.fit.frame_times.size());
 }
 
 }  // namespace

@@ -1,0 +1,44 @@
+// The whole diagnosis: what it hands on of the fits that it makes.
+#include "estimator/diagnosis/diagnose.h"
+
+#include <gtest/gtest.h>
+
+#include "simulation/simulate.h"
+
+namespace camgyro {
+namespace {
+
+// Where nothing is added, its result is what calibrate has, times of frames between the pairs
+// included.
+TEST(Diagnose, WithoutAnEffectFramesInBetweenHaveTimesAsWell) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 12.0;
+  scenario.tracks.reanchored = true;
+  scenario.effects.frame_stamp_jitter.spread_s = 2e-3;
+  const auto simulated = simulation::SimulateTracks(scenario, 5);
+  ASSERT_TRUE(simulated);
+  DiagnoseOptions options;
+  options.calibrate.given_start.emplace();
+  options.calibrate.given_start->delay_middle_row_s = simulated->truth.delay_s + 0.012;
+  options.calibrate.given_start->q_gyro_cam = simulated->truth.q_gyro_cam;
+  options.calibrate.online = false;
+  options.calibrate.effects = "frame_stamp_jitter";
+  Recording recording = simulated->recording;
+  recording.camera.focal_px = 1.02 * simulated->truth.lens[kFocal];
+
+  const auto calibrated = CalibrateRecording(recording, nullptr, options.calibrate);
+  ASSERT_TRUE(calibrated) << calibrated.error().message;
+  const Diagnosis diagnosis = Diagnose(recording, nullptr, options);
+  ASSERT_TRUE(diagnosis.before);
+  ASSERT_FALSE(diagnosis.after);
+  const auto& times = diagnosis.result().frame_times;
+  EXPECT_GT(times.size(), recording.frames.size() - 4);
+  ASSERT_EQ(times.size(), calibrated->frame_times.size());
+  for (size_t i = 0; i < times.size(); ++i) {
+    EXPECT_EQ(times[i].frame, calibrated->frame_times[i].frame);
+    EXPECT_NEAR(times[i].offset_s, calibrated->frame_times[i].offset_s, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace camgyro
