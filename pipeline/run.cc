@@ -62,7 +62,7 @@ Result<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options, DeviceClass de
                                   const Progress& progress, Recording* recording) {
   const Result<TrackingSummary> tracking = EnsureImageMotion(progress, recording);
   if (!tracking) return tl::unexpected(tracking.error());
-  DiagnosisRun run{*tracking, Diagnose(*recording, RotationsFrom(*recording), options, progress)};
+  DiagnosisRun run{*tracking, Diagnose(RotationsFrom(*recording), options, recording, progress)};
   // What the loop says of the model is tested on unseen frames: it needs no doubt beside.
   for (auto* report : {&run.diagnosis.before, &run.diagnosis.after}) {
     if (*report) CheckModel(*recording, options.calibrate, device, &**report);

@@ -119,14 +119,14 @@ void AddTimesBetween(const Recording& recording, const DiagnoseOptions& options,
                        GraphOptionsFor(recording, report.start, options.calibrate.window.graph));
 }
 
-// All but the times of frames in between. Repairs the recording (RepairGyro).
+// All but the times of frames in between.
 Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOptions& options,
-                       const Progress& progress, Recording* repaired) {
-  Recording& recording = *repaired;
+                       const Progress& progress, Recording* to_repair) {
+  const Recording& recording = *to_repair;
   Diagnosis diagnosis;
   diagnosis.faults = FindDataFaults(recording);
   const Result<CalibrationReport> before =
-      CalibrateOrSayWhy(rotations_at, options.calibrate, progress, &recording, &diagnosis.faults);
+      CalibrateOrSayWhy(rotations_at, options.calibrate, progress, to_repair, &diagnosis.faults);
   for (const DataFault& fault : diagnosis.faults) {
     if (FindEffect(fault.name) != nullptr) AddUnique(fault.name, &diagnosis.effects);
   }
@@ -174,10 +174,10 @@ Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOpti
 
 }  // namespace
 
-Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
-                   const DiagnoseOptions& options, const Progress& progress) {
-  Diagnosis diagnosis = DiagnoseFits(rotations_at, options, progress, &recording);
-  AddTimesBetween(recording, options, &diagnosis);
+Diagnosis Diagnose(const CameraRotationsAt& rotations_at, const DiagnoseOptions& options,
+                   Recording* recording, const Progress& progress) {
+  Diagnosis diagnosis = DiagnoseFits(rotations_at, options, progress, recording);
+  AddTimesBetween(*recording, options, &diagnosis);
   return diagnosis;
 }
 

@@ -90,10 +90,10 @@ struct Diagnosis {
 };
 
 // Never an error for data that are sound: a recording that cannot be calibrated has `refusal` set,
-// and `effects` say why where that can be said. The recording may be repaired (gyro_unit, ...): the
-// diagnosis says so.
-Diagnosis Diagnose(Recording recording, const CameraRotationsAt& rotations_at,
-                   const DiagnoseOptions& options, const Progress& progress = nullptr);
+// and `effects` say why where that can be said. Where a gyro in another unit or with mirrored axes
+// is all that is wrong, the recording is repaired, and the diagnosis says so (gyro_unit, ...).
+Diagnosis Diagnose(const CameraRotationsAt& rotations_at, const DiagnoseOptions& options,
+                   Recording* recording, const Progress& progress = nullptr);
 
 // The loop alone, from a calibration as the plain model has it: fills rounds, effects, maps and
 // indistinguishable of the result, and returns the fit share's calibration with the effects.

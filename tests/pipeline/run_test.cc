@@ -5,17 +5,20 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
 #include "pipeline/read_calibration.h"
+#include "simulation/simulate.h"
 #include "tests/paths.h"
 
 namespace camgyro {
@@ -117,6 +120,32 @@ TEST_F(FaultyRecording, FrameStampsOutOfOrder) {
   WriteFrames(frames);
   fs::create_symlink(sample_ / "cam0/video.mp4", folder_ / "cam0/video.mp4");
   EXPECT_THAT(Calibrate(), ElementsAre(Fault("frame_stamps_step_back", 3)));
+}
+
+// A left-handed gyro is mended where it stands, so that whatever looks at the recording afterwards
+// (the total of the sigmas, the report) sees what the calibration has seen.
+TEST(RunDiagnosis, MendsTheGyroForAllThatFollows) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 12.0;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRunning);
+  const auto simulated = simulation::SimulateTracks(scenario, 1);
+  ASSERT_TRUE(simulated);
+  Recording exchanged = simulated->recording;
+  for (GyroSample& sample : exchanged.gyro) {
+    std::swap(sample.omega_gyro_rad_s.x(), sample.omega_gyro_rad_s.y());
+  }
+  const Eigen::Vector3d before_rad_s = exchanged.gyro[100].omega_gyro_rad_s;
+  const auto run = RunDiagnosis({}, DeviceClass::kPhone, nullptr, &exchanged);
+  ASSERT_TRUE(run) << run.error().message;
+  const Diagnosis& diagnosis = run->diagnosis;
+  ASSERT_THAT(diagnosis.faults, testing::Contains(Field(&DataFault::name, "gyro_axes")));
+  EXPECT_EQ(exchanged.gyro[100].omega_gyro_rad_s, -before_rad_s);
+  const Calibration& found = diagnosis.result().calibration;
+  const StateVector error = Difference(found, simulated->truth);
+  ASSERT_TRUE(found.sigma_total());
+  EXPECT_LT(std::abs(error[kStateFocal]), 3.0 * (*found.sigma_total())[kStateFocal]);
+  // With the gyro as it was, the lens could be anything: 40 px.
+  EXPECT_LT((*found.sigma_total())[kStateFocal], 0.01 * simulated->truth.lens[kFocal]);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ TEST(Diagnose, WithoutAnEffectFramesInBetweenHaveTimesAsWell) {
 
   const auto calibrated = CalibrateRecording(recording, nullptr, options.calibrate);
   ASSERT_TRUE(calibrated) << calibrated.error().message;
-  const Diagnosis diagnosis = Diagnose(recording, nullptr, options);
+  const Diagnosis diagnosis = Diagnose(nullptr, options, &recording);
   ASSERT_TRUE(diagnosis.before);
   ASSERT_FALSE(diagnosis.after);
   const auto& times = diagnosis.result().frame_times;
