@@ -38,6 +38,7 @@ constexpr double kDeterminedReadout = 0.15;
 constexpr double kModelReadout = 0.05;   // the loss is no parabola (docs/lab/start.md)
 constexpr double kLeastMatches = 15.0;   // of a pair that has a rotation
 constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
+constexpr int kScannedOn = 2;            // points at a time, beyond the end of a scan
 
 struct ScanPoint {
   double x = 0.0;  // what is scanned: log of the focal length, or readout time / frame interval
@@ -223,7 +224,7 @@ class FocalScan {
          SecondsSince(recording_.frames.front().stamp_ns, recording_.gyro.front().stamp_ns)) *
         (1.0 + near_.clock_skew);
     const ScanCurve curve = Scan(
-        logs, static_cast<double>(step) * spacing_, /*means_of=*/1.0,
+        logs, static_cast<double>(step) * spacing_, LogLongest(), /*means_of=*/1.0,
         [this](double x) {
           return RotationTrial{std::exp(x), rough_};
         },
@@ -287,7 +288,7 @@ class FocalScan {
     std::vector<double> parts;
     for (int k = 0; k < count; ++k) parts.push_back(spacing * k - scan_options_.max_readout);
     const ScanCurve curve = Scan(
-        parts, spacing, kLeastMatches,
+        parts, spacing, parts.back(), kLeastMatches,
         [this](double part) {
           RotationTrial trial{best_focal_px_, rough_};
           trial.rough->readout_s = part * interval_s_;
@@ -324,6 +325,10 @@ class FocalScan {
     return logs;
   }
 
+  double LogLongest() const {
+    return LogFocals().front() + std::log(scan_options_.longest_focal / scan_options_.min_focal);
+  }
+
   // The first start that works, without knowing anything of the gyro; else why the first did not.
   Status FindNearAt(const std::vector<double>& log_focals) {
     StartOptions loose = options_;
@@ -343,10 +348,11 @@ class FocalScan {
     return first_error;
   }
 
-  // The losses at all values, and at two more around the best of them.
+  // The losses at all values, beyond them up to `farthest` while the last is the best, and at two
+  // more around the best of all.
   template <typename MakeTrial, typename Measure>
-  ScanCurve Scan(const std::vector<double>& values, double spacing, double means_of,
-                 const MakeTrial& trial_at, const Measure& measure) const {
+  ScanCurve Scan(const std::vector<double>& values, double spacing, double farthest,
+                 double means_of, const MakeTrial& trial_at, const Measure& measure) const {
     const auto measure_all = [&](const std::vector<double>& xs) {
       std::vector<RotationTrial> trials;
       for (const double x : xs) trials.push_back(trial_at(x));
@@ -360,11 +366,19 @@ class FocalScan {
       }
       return points;
     };
-    std::vector<ScanPoint> points = measure_all(values);
-    const double best = ScanCurve(points, spacing, means_of).Best().x;
-    for (ScanPoint& point : measure_all({best - 0.5 * spacing, best + 0.5 * spacing})) {
-      points.push_back(std::move(point));
+    std::vector<ScanPoint> points;
+    const auto add = [&](const std::vector<double>& xs) {
+      for (ScanPoint& point : measure_all(xs)) points.push_back(std::move(point));
+      return ScanCurve(points, spacing, means_of).Best().x;
+    };
+    double last = values.back();
+    double best = add(values);
+    while (best == last && last + kScannedOn * spacing <= farthest) {
+      std::vector<double> beyond;
+      for (int k = 0; k < kScannedOn; ++k) beyond.push_back(last += spacing);
+      best = add(beyond);
     }
+    add({best - 0.5 * spacing, best + 0.5 * spacing});
     return ScanCurve(std::move(points), spacing, means_of);
   }
 

@@ -17,9 +17,11 @@ using CameraRotationsAt = std::function<std::vector<std::vector<CameraRotation>>
     const Recording& recording, const std::vector<RotationTrial>& trials)>;
 
 struct FocalScanOptions {
-  // Of the picture's longer side: 0.4 is a full field of view of 103 deg, 1.8 of 31 deg.
+  // Of the picture's longer side: 0.4 is a full field of view of 103 deg, 1.8 of 31 deg. Where the
+  // longest is the best, the scan goes on as far as that gets better, to a tele lens of 8 deg.
   double min_focal = 0.4;
   double max_focal = 1.8;
+  double longest_focal = 7.0;
   int points = 22;  // logarithmic; 7 % apart
   // Readout times tried, as parts of the frame interval, of both signs (a picture that was turned
   // by half a turn has its last row read first). Phones that need all of it are common, and a

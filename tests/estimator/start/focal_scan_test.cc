@@ -68,6 +68,25 @@ TEST(FindStartAndFocal, FindsTheFocalLength) {
   EXPECT_LT(chi_square, 2.3);
 }
 
+// Two and a half times the longer side, beyond the end of the scan: it goes on.
+TEST(FindStartAndFocal, FindsATeleLens) {
+  Simulated s = MakeScene(SmoothRandomRate(70, 0.8), 0);
+  s.recording.camera.width_px = 200;
+  s.recording.camera.height_px = 150;
+  const auto start = FindStartAndFocal(s.recording, SeenAt(s), {}, {});
+  ASSERT_TRUE(start) << start.error().message;
+  ASSERT_TRUE(start->focal);
+  EXPECT_TRUE(start->focal->determined);
+  EXPECT_NEAR(start->focal->value_px, kTrueFocalPx, 0.02 * kTrueFocalPx);
+  EXPECT_NEAR(start->delay_middle_row_s, CoarseTruth().delay_s, 0.003);
+  // As far as it gets better, and not to the longest.
+  EXPECT_LT(start->focal->curve.back().focal_px, 1.3 * kTrueFocalPx);
+  FocalScanOptions no_further;
+  no_further.longest_focal = no_further.max_focal;
+  const auto without = FindStartAndFocal(s.recording, SeenAt(s), {}, no_further);
+  EXPECT_FALSE(without && without->focal && without->focal->determined);
+}
+
 // What is wrong about the readout time, times the difference of the rates at the ends of a pair, is
 // left between its matches: some of it, beside their noise.
 TEST(FindStartAndFocal, FindsTheReadoutTime) {
