@@ -176,6 +176,11 @@ void ExplainHalves(const Tested& t, const Usual& u, CalibrationReport* report) {
   }
 }
 
+// Parallax may hide more than the noise of the gyro's bias: a note says so.
+bool HidesTurns(const Tested& t, const Calibration& c) {
+  return t.unseen_parallax_rad_s > kUnseenSaid * c.sigma().segment<3>(kStateBias).maxCoeff();
+}
+
 void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
   Calibration& c = report->calibration;
   c.total_covariance = StateCovariance(c.covariance + u.X * u.C * u.X.transpose());
@@ -196,7 +201,7 @@ void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
   of_bias.block<3, 3>(kStateBias, kStateBias) = across * across.transpose();
   *c.total_covariance += of_bias;
   report->systematic.push_back({kUnseenParallax, of_bias.diagonal().cwiseSqrt()});
-  if (t.unseen_parallax_rad_s > kUnseenSaid * c.sigma().segment<3>(kStateBias).maxCoeff()) {
+  if (HidesTurns(t, c)) {
     report->notes.push_back(Format(
         "what the pictures show is so far, or so equally far, that a step sideways looks like "
         "a turn: the gyro's bias may be off by %.2g deg/s",
@@ -222,17 +227,20 @@ bool StretchesBearOut(const Tested& t, const Candidate& candidate, const ScoreTe
   return GainBearsOut(result, static_cast<double>(t.candidates.size()));
 }
 
-// The most significant candidate of those that are so beyond doubt and that the stretches bear out.
-// (What parallax hides in far things pulls all stretches together, so that p alone doubts what is
-// right: handheld, 30 to 300 m, docs/lab/pairs.md.)
+// The most significant candidate, if it is so beyond doubt. What parallax hides in far things pulls
+// all stretches together, so that p alone doubts what is right (handheld, 30 to 300 m): there the
+// stretches have to bear the candidate out as well. (Not elsewhere: a delay that jitters from
+// second to second, as of tablet-attitude, is one that other stretches do not know.)
 std::optional<std::string> Suspect(const Tested& t, const Calibration& model,
                                    const std::vector<ScoreTest>& alone, const Scatter& usual) {
+  const bool hides_turns = HidesTurns(t, model);
   const Candidate* best = nullptr;
   double best_p = kNoDoubt / static_cast<double>(t.candidates.size());
   for (size_t i = 0; i < t.candidates.size(); ++i) {
     if (alone[i].dof == 0) continue;
     const ScoreTest test = TestColumns(t.scores, t.candidates[i].columns(), t.prior, usual);
-    if (test.dof > 0 && test.p_value < best_p && StretchesBearOut(t, t.candidates[i], test)) {
+    if (test.dof > 0 && test.p_value < best_p &&
+        (!hides_turns || StretchesBearOut(t, t.candidates[i], test))) {
       best_p = test.p_value;
       best = &t.candidates[i];
     }

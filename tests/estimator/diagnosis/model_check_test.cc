@@ -9,7 +9,9 @@
 #include "core/effects/catalogue.h"
 #include "estimator/diagnosis/unseen_parallax.h"
 #include "estimator/halves.h"
+#include "frontend/readers/read_recording.h"
 #include "tests/estimator/simulated_input.h"
+#include "tests/measured_data.h"
 
 namespace camgyro {
 namespace {
@@ -225,6 +227,20 @@ TEST(ModelCheck, AFactorOfOneIsNoDoubt) {
   EXPECT_NEAR(little.calibration.covariance.trace() / noise, 1.08, 1e-6);
   const CalibrationReport more = with(1.5 * expected);
   EXPECT_THAT(more.doubts, testing::Contains(HasSubstr("multiplied by 1.2")));
+}
+
+// The delay of these tablets jitters from second to second (docs/lab/measured.md): whatever one
+// stretch says of it, the next one does not know, and still it is there.
+TEST(ModelCheck, MeasuredDelaysThatJitterAreDoubted) {
+  const auto folder = MeasuredData("tablet-attitude/D02");
+  if (!folder) GTEST_SKIP() << "no measured recordings: set CAMGYRO_DATA";
+  const auto recording = ReadRecording(*folder);
+  ASSERT_TRUE(recording) << recording.error().message;
+  auto report = CalibrateRecording(*recording, nullptr, {});
+  ASSERT_TRUE(report) << report.error().message;
+  const auto doubt = CheckModel(*recording, {}, DeviceClass::kPhone, &*report);
+  ASSERT_TRUE(doubt);
+  EXPECT_THAT(*doubt, HasSubstr("delay_wander"));
 }
 
 // Every row of the table is an effect that exists, in a shape that exists, with a size that is less
