@@ -9,6 +9,7 @@
 
 #include "core/format.h"
 #include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/gain_rule.h"
 #include "estimator/diagnosis/pair_scores.h"
 #include "estimator/diagnosis/score_test.h"
 #include "estimator/diagnosis/shares.h"

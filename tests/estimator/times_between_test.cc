@@ -14,6 +14,7 @@
 
 #include "core/effects/catalogue.h"
 #include "estimator/window/pair_graph.h"
+#include "estimator/window/refinement.h"
 #include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
