@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "estimator/diagnosis/thresholds.h"
 #include "simulation/simulate.h"
@@ -17,6 +18,15 @@ Recording Tracks(double mean_life_frames) {
   scenario.duration_s = 30.0;
   scenario.tracks.count = 40;
   scenario.tracks.mean_life_frames = mean_life_frames;
+  auto simulated = simulation::SimulateTracks(scenario);
+  EXPECT_TRUE(simulated);
+  return std::move(simulated->recording);
+}
+
+Recording Moving(simulation::MotionKind kind, double duration_s) {
+  simulation::Scenario scenario;
+  scenario.duration_s = duration_s;
+  scenario.motion = simulation::MotionPreset(kind);
   auto simulated = simulation::SimulateTracks(scenario);
   EXPECT_TRUE(simulated);
   return std::move(simulated->recording);
@@ -78,12 +88,7 @@ TEST(Shares, HaveNoMoreBlocksInAnHour) {
 
 // Of a turn on the spot, pairs are long (SelectPairs), and stretches, too: half of the pairs stay.
 TEST(Shares, HaveRoomForLongPairs) {
-  simulation::Scenario scenario;
-  scenario.duration_s = 14.0;
-  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRotation);
-  const auto simulated = simulation::SimulateTracks(scenario);
-  ASSERT_TRUE(simulated);
-  const Recording& recording = simulated->recording;
+  const Recording recording = Moving(simulation::MotionKind::kRotation, 14.0);
   const PairSelection selection = SelectPairs(recording);
   const double pair_s = selection.gap * MedianInterval(recording.frames);
   ASSERT_GT(pair_s, kLeastFramesOfBlock * MedianInterval(recording.frames));
@@ -126,12 +131,8 @@ TEST(Shares, NoTrackOfTheReportIsInAnotherShare) {
 
 // Tracks that last until they leave the picture leave too few of their own: said, not hidden.
 TEST(Shares, SaysIfTracksGoOn) {
-  simulation::Scenario scenario;
-  scenario.duration_s = 12.0;
-  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kSlow);
-  const auto simulated = simulation::SimulateTracks(scenario);
-  ASSERT_TRUE(simulated);
-  const Shares shares = MakeShares(simulated->recording, MakeEstimationInput(simulated->recording));
+  const Recording recording = Moving(simulation::MotionKind::kSlow, 12.0);
+  const Shares shares = MakeShares(recording, MakeEstimationInput(recording));
   EXPECT_TRUE(shares.report_shares_tracks);
   EXPECT_GT(Joined(shares.report).front().matches.size(), 50u);
 }
