@@ -35,8 +35,7 @@ struct ShareLimits {
 
 // Short blocks, so that what changes with time is seen by all shares: 1/40 of the recording, within
 // 0.2 and 3 s, at least 6 frames and twice the length of a pair; longer ones where there would be
-// more than 300. `input` may be an
-// outline (OutlineOf): pairs that stay have their matches.
+// more than 300. `input` may be an outline (OutlineOf): pairs that stay have their matches.
 Shares MakeShares(const Recording& recording, const EstimationInput& input,
                   const ShareLimits& limits = {});
 
