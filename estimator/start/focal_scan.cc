@@ -1,6 +1,5 @@
 #include "estimator/start/focal_scan.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -14,19 +13,18 @@
 #include "estimator/start/clock_rate.h"
 #include "estimator/start/lag_search.h"
 #include "estimator/start/rate_alignment.h"
+#include "estimator/start/scan_curve.h"
 #include "estimator/start/start_fit.h"
 
 namespace camgyro {
 namespace {
 
-constexpr int kBlocks = 20;              // of time, for the honest sigma
-constexpr double kTruncateSigmas = 3.0;  // of the norm of two axes
-constexpr double kMedianNorm2 = 1.177;   // median norm of 2 normal variables of sigma 1
-constexpr double kDeterminedLog = 0.1;   // sigma of log f
-constexpr double kDistinctLog = 0.22;    // 25 %
-constexpr double kMaxRunnerUp = 0.8;     // a wrong lens moves shallow minima far
-constexpr double kModelLog = 0.02;       // a lens that nothing declares bends it further
-constexpr double kUnknownLog = 0.3;      // what is known of any lens
+constexpr double kMedianNorm2 = 1.177;  // median norm of 2 normal variables of sigma 1
+constexpr double kDeterminedLog = 0.1;  // sigma of log f
+constexpr double kDistinctLog = 0.22;   // 25 %
+constexpr double kMaxRunnerUp = 0.8;    // a wrong lens moves shallow minima far
+constexpr double kModelLog = 0.02;      // a lens that nothing declares bends it further
+constexpr double kUnknownLog = 0.3;     // what is known of any lens
 // Directions of the orientation that a motion determines which tells a focal length: one about a
 // single axis of the picture determines two.
 constexpr int kLeastAxes = 2;
@@ -39,19 +37,6 @@ constexpr double kModelReadout = 0.05;   // the loss is no parabola (docs/lab/st
 constexpr double kLeastMatches = 15.0;   // of a pair that has a rotation
 constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
 constexpr int kScannedOn = 2;            // points at a time, beyond the end of a scan
-
-struct ScanPoint {
-  double x = 0.0;  // what is scanned: log of the focal length, or readout time / frame interval
-  RotationTrial trial;
-  std::vector<CameraRotation> rotations;
-  // Of each pair: squared residuals, in the units of the noise, and its block.
-  std::vector<double> squares;
-  std::vector<int> blocks;
-  double noise = 0.0;
-  double gyro_power = 0.0;
-  // Truncated losses per block.
-  Eigen::VectorXd loss;
-};
 
 // Residuals of pan and tilt at one point [px/s], with lag, orientation and bias fitted to it. In
 // the image (angle times focal length), where the camera's noise does not depend on the focal
@@ -76,7 +61,7 @@ void MeasureAngles(const Recording& recording, const StartResult& near, double l
     const double scale = point->trial.focal_px * std::sqrt(cam.weight[i]);
     norms.push_back(scale * (cam.omega_cam_rad_s.col(i) - gyro_rate_cam).head<2>().norm());
     point->squares.push_back(norms.back() * norms.back());
-    point->blocks.push_back(cam.frame_a[i] * kBlocks / frames);
+    point->blocks.push_back(cam.frame_a[i] * kScanBlocks / frames);
     point->gyro_power += cam.weight[i] * gyro_rate_cam.head<2>().squaredNorm();
   }
   point->noise = MedianInPlace(&norms) / kMedianNorm2;
@@ -87,102 +72,11 @@ void MeasureMatches(const Recording& recording, ScanPoint* point) {
   const int frames = static_cast<int>(recording.frames.size());
   for (const CameraRotation& rotation : point->rotations) {
     point->squares.push_back(rotation.residual_px * rotation.residual_px);
-    point->blocks.push_back(rotation.frame_a * kBlocks / frames);
+    point->blocks.push_back(rotation.frame_a * kScanBlocks / frames);
   }
   std::vector<double> squares = point->squares;
   if (!squares.empty()) point->noise = std::sqrt(MedianInPlace(&squares));
 }
-
-// Parabola y = c0 + c1 x + c2 x^2 through points (least squares); rows of coefficients per column
-// of y.
-Eigen::MatrixXd FitParabola(const Eigen::VectorXd& x, const Eigen::MatrixXd& y) {
-  Eigen::MatrixXd powers(x.size(), 3);
-  powers << Eigen::VectorXd::Ones(x.size()), x, x.cwiseAbs2();
-  return powers.colPivHouseholderQr().solve(y);
-}
-
-// The losses along what is scanned, by ascending x.
-class ScanCurve {
- public:
-  // spacing: between the points, of which there are two more half of it around the best one.
-  // means_of: each square is the mean of at least so many.
-  ScanCurve(std::vector<ScanPoint> points, double spacing, double means_of)
-      : points_(std::move(points)), spacing_(spacing), means_of_(means_of) {
-    std::sort(points_.begin(), points_.end(),
-              [](const ScanPoint& a, const ScanPoint& b) { return a.x < b.x; });
-    Truncate();
-  }
-
-  const std::vector<ScanPoint>& points() const { return points_; }
-  double gyro_power() const { return gyro_power_; }
-
-  const ScanPoint& Best() const {
-    return *std::min_element(
-        points_.begin(), points_.end(),
-        [](const ScanPoint& a, const ScanPoint& b) { return a.loss.sum() < b.loss.sum(); });
-  }
-
-  // Loss of the best point / least loss further than `distance` away from it.
-  double RunnerUpRatio(double distance) const {
-    const ScanPoint& best = Best();
-    double second = -1.0;
-    for (const ScanPoint& point : points_) {
-      if (std::abs(point.x - best.x) <= distance) continue;
-      if (second < 0.0 || point.loss.sum() < second) second = point.loss.sum();
-    }
-    return second > 0.0 ? best.loss.sum() / second : 1.0;
-  }
-
-  // Of the parabola through the points around the best one: x, and its standard deviation.
-  std::pair<double, double> Minimum() const {
-    const ScanPoint& best = Best();
-    std::vector<const ScanPoint*> close;
-    for (const ScanPoint& point : points_) {
-      if (std::abs(point.x - best.x) < 1.1 * spacing_) close.push_back(&point);
-    }
-    Eigen::VectorXd x(static_cast<Eigen::Index>(close.size()));
-    Eigen::MatrixXd y(static_cast<Eigen::Index>(close.size()), kBlocks);
-    for (size_t k = 0; k < close.size(); ++k) {
-      x[static_cast<Eigen::Index>(k)] = close[k]->x - best.x;
-      y.row(static_cast<Eigen::Index>(k)) = close[k]->loss.transpose();
-    }
-    const Eigen::MatrixXd parabolas = FitParabola(x, y);
-    const Eigen::Vector3d sum = parabolas.rowwise().sum();
-    const bool inside = &best != &points_.front() && &best != &points_.back();
-    if (!inside || !(sum[2] > 0.0)) return {best.x, 1.0};
-    const double shift = std::clamp(-0.5 * sum[1] / sum[2], -spacing_, spacing_);
-    const double classical = noise_ * noise_ / (means_of_ * sum[2]);
-    const double scores = (parabolas.row(1) + 2.0 * shift * parabolas.row(2)).squaredNorm() *
-                          kBlocks / (kBlocks - 1.0);
-    const double sandwich = scores / (4.0 * sum[2] * sum[2]);
-    return {best.x + shift, std::min(1.0, std::sqrt(std::max(classical, sandwich)))};
-  }
-
- private:
-  // Losses, bounded by the least noise of any point.
-  void Truncate() {
-    size_t pairs = 1;  // with a rotation, at the point that has most
-    for (const ScanPoint& point : points_) {
-      if (point.squares.empty()) continue;
-      if (noise_ < 0.0 || point.noise < noise_) noise_ = point.noise;
-      pairs = std::max(pairs, point.squares.size());
-      gyro_power_ = std::max(gyro_power_, point.gyro_power);
-    }
-    const double cap = 2.0 * std::pow(kTruncateSigmas * noise_, 2);
-    for (ScanPoint& point : points_) {
-      point.loss = Eigen::VectorXd::Zero(kBlocks);
-      for (size_t i = 0; i < point.squares.size(); ++i) {
-        point.loss[point.blocks[i]] += std::min(point.squares[i], cap);
-      }
-      // A pair that found no rotation at this point counts as an outlier.
-      point.loss.array() += cap * static_cast<double>(pairs - point.squares.size()) / kBlocks;
-    }
-  }
-
-  std::vector<ScanPoint> points_;
-  double spacing_, means_of_;
-  double noise_ = -1.0, gyro_power_ = 0.0;
-};
 
 // The scans, step by step.
 class FocalScan {
