@@ -17,7 +17,6 @@ constexpr int kMaxTemplatePairs = 900;  // of the search over all alignments: bo
 // Below, even a fit without any noise would be of no use: 1 px per frame at 30 Hz and 600 px is
 // 0.05 rad/s. (Real micro-motion of 0.007 rad/s of a drone at rest is found, to 0.4 ms.)
 constexpr double kNoRotationRadS = 0.01;
-constexpr double kGoodFit = 0.9;  // explained; below, a note
 constexpr double kDegreesPerRadian = 57.29577951308232;
 constexpr double kUnitTolerance = 1.2;
 
@@ -128,7 +127,7 @@ StartResult MakeResult(const LagSearch& search, double delay_offset_s,
   result.noise_rad_s = fit.noise_rad_s;
   result.gyro_rms_rad_s = search.gyro_rms_rad_s;
   result.pairs = search.best.pairs;
-  if (result.explained < kGoodFit) {
+  if (result.explained < kWellExplained) {
     result.notes.push_back(
         "the camera explains " + Percent(result.explained) +
         " of the gyro's motion: noisy camera rotations, or a wrong lens or focal "
@@ -157,8 +156,8 @@ std::string TooLittle(const CameraRates& camera, double span_s, const StartOptio
   std::string reason = "too short: ";
   if (all_s > 2.0 * options.min_span_s) {
     reason = "the pictures of " + Seconds(all_s) +
-             " could not be followed (dark, blurred, without contrast, or in light that "
-             "flickers): ";
+             " could not be followed (dark, blurred, without contrast, in light that flickers, "
+             "or of too few points): ";
   }
   return reason + std::to_string(camera.size()) + " camera rotations in " + Seconds(span_s) +
          ", expected at least " + std::to_string(options.min_pairs) + " in " +

@@ -14,6 +14,9 @@
 
 namespace camgyro {
 
+// Of the gyro's motion, explained by the camera's: below, a start says so in a note.
+constexpr double kWellExplained = 0.9;
+
 struct StartOptions {
   double search_s = 2.0;        // half range of delays around the recording's guess, or zero
   int min_pairs = 20;           // camera rotations inside the gyro's time,

@@ -37,6 +37,7 @@ constexpr double kModelReadout = 0.05;   // the loss is no parabola (docs/lab/st
 constexpr double kLeastMatches = 15.0;   // of a pair that has a rotation
 constexpr double kLooseRateRatio = 4.5;  // the whole scan may be off by this
 constexpr int kScannedOn = 2;            // points at a time, beyond the end of a scan
+constexpr double kTeleOverlap = 1.2;     // of the scans: a minimum at the end of one is none
 
 // Residuals of pan and tilt at one point [px/s], with lag, orientation and bias fitted to it. In
 // the image (angle times focal length), where the camera's noise does not depend on the focal
@@ -100,14 +101,42 @@ class FocalScan {
       return std::abs(a - log_guess_) < std::abs(b - log_guess_);
     });
     const Status first = FindNearAt({logs.front()});
-    if (first || FindNearAt({logs.begin() + 1, logs.end()})) {
-      rough_ =
-          RoughlyAligned(near_, recording_.camera.readout_s.value_or(kUsualReadout * interval_s_));
-      return {};
-    }
-    return first;
+    return first || FindNearAt({logs.begin() + 1, logs.end()}) ? Status() : first;
   }
 
+  // The same from the focal length that explains most of the gyro's motion, if more than so much.
+  Status FindBestNear(double explained) { return FindNearAt(LogFocals(), explained); }
+
+  // How much of the gyro's motion is explained by rotations that know nothing of it; 0 where
+  // nothing was found near.
+  double explained() const { return near_.explained; }
+
+  // The start, from what was found near it.
+  Result<StartResult> Refine() {
+    StartReadout readout{recording_.camera.readout_s.value_or(0.0), 0.0, true};
+    ScanFocals(/*step=*/2);
+    Improve();
+    if (!recording_.camera.readout_s) readout = ScanReadouts();
+    StartFocal focal = ScanFocals(/*step=*/1);
+    auto start = StartAt(focal.value_px);
+    // Pan and tilt tell the focal length where the motion tells which of the gyro's they are.
+    if (start && focal.determined && start->rotation_axes_determined < kLeastAxes) {
+      LeaveOpen(&focal);
+      start = StartAt(focal.value_px);
+    }
+    if (!start) return start;
+    if (!focal.determined) {
+      start->notes.push_back(
+          "the focal length is not determined (too little pan and tilt, or a distorting lens); " +
+          std::string(recording_.camera.focal_px ? "the recording's guess" : "a usual one") +
+          " is used");
+    }
+    start->focal = std::move(focal);
+    start->readout = readout;
+    return start;
+  }
+
+ private:
   // The focal length, by the parabola around the best of all, or of every `step`-th.
   StartFocal ScanFocals(size_t step) {
     std::vector<double> logs;
@@ -205,7 +234,6 @@ class FocalScan {
     return FindStart(recording_, rotations_at_(recording_, {{focal_px, rough_}}).front(), options_);
   }
 
- private:
   static double UsualInterval(const Recording& recording) {
     return std::min(1.0 / 30.0, MedianInterval(recording.frames));
   }
@@ -223,23 +251,26 @@ class FocalScan {
     return LogFocals().front() + std::log(scan_options_.longest_focal / scan_options_.min_focal);
   }
 
-  // The first start that works, without knowing anything of the gyro; else why the first did not.
-  Status FindNearAt(const std::vector<double>& log_focals) {
+  // The first start that works, without knowing anything of the gyro, or the one that explains
+  // most, if more than `explained`; else why the first did not work.
+  Status FindNearAt(const std::vector<double>& log_focals, std::optional<double> explained = {}) {
     StartOptions loose = options_;
     loose.max_rate_ratio = kLooseRateRatio;
     std::vector<RotationTrial> trials;
     for (const double log_focal : log_focals) trials.push_back({std::exp(log_focal), std::nullopt});
-    Status first_error = CannotEstimate("");
+    Status found = CannotEstimate("");
     const auto rotations = rotations_at_(recording_, trials);
-    for (size_t k = 0; k < trials.size(); ++k) {
+    for (size_t k = 0; k < trials.size() && (explained || !found); ++k) {
       Result<StartResult> near = FindStart(recording_, rotations[k], loose);
-      if (near) {
-        near_ = std::move(*near);
-        return {};
-      }
-      if (k == 0) first_error = tl::unexpected<Error>(near.error());
+      if (!near && k == 0) found = tl::unexpected<Error>(near.error());
+      if (!near || (explained && near->explained <= *explained)) continue;
+      if (explained) explained = near->explained;
+      near_ = std::move(*near);
+      rough_ =
+          RoughlyAligned(near_, recording_.camera.readout_s.value_or(kUsualReadout * interval_s_));
+      found = {};
     }
-    return first_error;
+    return found;
   }
 
   // The losses at all values, beyond them up to `farthest` while the last is the best, and at two
@@ -305,29 +336,23 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   if (scan_options.readouts < 5 || !(scan_options.max_readout > 0.0)) {
     return BadUsage("readout scan: expected 5 points or more and 0 < max_readout");
   }
-  FocalScan scan(recording, rotations_at, options, scan_options);
-  if (const Status near = scan.FindNear(); !near) return tl::unexpected(near.error());
-  StartReadout readout{recording.camera.readout_s.value_or(0.0), 0.0, true};
-  scan.ScanFocals(/*step=*/2);
-  scan.Improve();
-  if (!recording.camera.readout_s) readout = scan.ScanReadouts();
-  StartFocal focal = scan.ScanFocals(/*step=*/1);
-  auto start = scan.StartAt(focal.value_px);
-  // Pan and tilt tell the focal length where the motion tells which of the gyro's they are.
-  if (start && focal.determined && start->rotation_axes_determined < kLeastAxes) {
-    scan.LeaveOpen(&focal);
-    start = scan.StartAt(focal.value_px);
-  }
-  if (!start) return start;
-  if (!focal.determined) {
-    start->notes.push_back(
-        "the focal length is not determined (too little pan and tilt, or a distorting lens); " +
-        std::string(recording.camera.focal_px ? "the recording's guess" : "a usual one") +
-        " is used");
-  }
-  start->focal = std::move(focal);
-  start->readout = readout;
-  return start;
+  FocalScan usual(recording, rotations_at, options, scan_options);
+  const Status near = usual.FindNear();
+  const double near_explained = usual.explained();
+  Result<StartResult> start = near ? usual.Refine() : tl::unexpected(near.error());
+  if (start && start->explained >= kWellExplained) return start;
+  // Through a tele lens, a usual focal length makes pan and tilt several times too large, but not
+  // roll. What fits the gyro best then has little to do with how it lies, and rotations that are
+  // made near to that fit the gyro's best at the shortest focal lengths. A longer one is tried that
+  // explains distinctly more, by rotations that are not made near to anything.
+  FocalScanOptions longer = scan_options;
+  longer.min_focal = scan_options.max_focal / kTeleOverlap;
+  longer.max_focal = scan_options.longest_focal;
+  if (!(longer.max_focal > longer.min_focal)) return start;
+  FocalScan tele(recording, rotations_at, options, longer);
+  if (!tele.FindBestNear(1.0 - kMaxRunnerUp * (1.0 - near_explained))) return start;
+  Result<StartResult> better = tele.Refine();
+  return better && (!start || better->explained > start->explained) ? better : start;
 }
 
 Result<StartResult> FindStartFromPictures(const Recording& recording,

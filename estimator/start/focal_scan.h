@@ -42,6 +42,9 @@ struct FocalScanOptions {
 // known of that (RotationTrial::rough). The readout time, where the recording does not declare it,
 // is the one with which they fit the gyro best, found likewise at the best focal length of a first
 // scan, and used in a second one.
+//
+// What explains less than kWellExplained is held against a start through a tele lens, which is
+// scanned from max_focal to longest_focal, if that explains distinctly more.
 Result<StartResult> FindStartAndFocal(const Recording& recording,
                                       const CameraRotationsAt& rotations_at,
                                       const StartOptions& options,

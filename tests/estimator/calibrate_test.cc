@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/usual_focal.h"
+#include "estimator/start/focal_scan.h"
 #include "estimator/starting_point.h"
 #include "estimator/window/residuals/all_residuals.h"
 #include "frontend/readers/repair_stamps.h"
@@ -103,6 +104,25 @@ TEST(CalibrateRecording, RefinesTheMostInformativePairsOfALongOne) {
   // Of 44 numbers: 1 +- 0.21.
   EXPECT_LT(nees, 1.8);
   EXPECT_GT(nees, 0.3);
+}
+
+// Through a tele lens of four times the picture's width, usual focal lengths make pan and tilt five
+// times too large, but not roll. A start that stops looking there is refused.
+TEST(CalibrateRecording, FindsATeleLens) {
+  Scenario scenario = ShortScenario(12.0);
+  scenario.camera.focal_px = 4.0 * scenario.camera.width_px;
+  const Simulated s = SimulateTracks(scenario).value();
+  const CameraRotationsAt rotations_at = RotationsOfPictures(s.recording, 100);
+  FocalScanOptions no_further;
+  no_further.longest_focal = no_further.max_focal;
+  const auto usual = FindStartAndFocal(s.recording, rotations_at, {}, no_further);
+  EXPECT_FALSE(usual && usual->explained > kWellExplained);
+  const Result<CalibrationReport> report = CalibrateRecording(s.recording, rotations_at, {});
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_GT(report->start.explained, kWellExplained);
+  const StateVector error = ErrorInSigmas(report->calibration, s.truth);
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 5.0) << error.transpose();
+  EXPECT_LT(report->calibration.sigma()[kStateFocal], 0.01 * scenario.camera.focal_px);
 }
 
 // A lens that moves follows the rates at the time of exposure. With the effect as the delay of the

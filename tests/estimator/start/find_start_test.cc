@@ -239,8 +239,8 @@ TEST(FindStartRefuses, ShortRecordings) {
   Simulated s = Simulate(SmoothRandomRate(1, 0.8), truth, 1);
   s.rotations.clear();
   ExpectRefused(s,
-                "could not be followed (dark, blurred, without contrast, or in light that "
-                "flickers): 0 camera rotations");
+                "could not be followed (dark, blurred, without contrast, in light that flickers, "
+                "or of too few points): 0 camera rotations");
   s.recording.gyro.clear();
   ExpectRefused(s, "gyro samples");
 }
