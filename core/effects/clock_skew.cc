@@ -37,11 +37,11 @@ std::shared_ptr<const Effect> MakeClockSkew(const EffectSetup& setup, const std:
   char* end = nullptr;
   const double known_ppm = std::strtod(shape.c_str(), &end);
   if (shape.empty() || *end != 0 || !(known_ppm > 0.0 && known_ppm <= kLoggerPpm) ||
-      setup.gyro_times_s.empty()) {
+      setup.gyro->times_s.empty()) {
     return nullptr;
   }
   return std::make_shared<ClockSkew>(std::hypot(kCrystalPpm, known_ppm), 0.0, setup.delay_s,
-                                     0.5 * setup.gyro_times_s.back());
+                                     0.5 * setup.gyro->times_s.back());
 }
 
 }  // namespace

@@ -104,14 +104,21 @@ class Effect {
   const std::vector<EffectParameter> parameters_;
 };
 
+// Vectors of a sensor over time, one column per time.
+struct SensorSamples {
+  std::vector<double> times_s;  // after the first gyro stamp
+  Eigen::Matrix3Xd values;
+};
+
 // What an effect may know of the recording that it is made for.
 struct EffectSetup {
   Eigen::Vector2d size_px = Eigen::Vector2d::Zero();
-  std::vector<FrameTime> frames;          // at least two
-  std::vector<double> gyro_times_s;       // after the first gyro stamp
-  Eigen::Matrix3Xd gyro_rad_s;            // readings, one column per time
-  std::vector<double> accel_times_s;      // after the first gyro stamp; empty: no accelerometer
-  Eigen::Matrix3Xd accel_m_s2;            // specific force in the gyro frame, one column per time
+  std::vector<FrameTime> frames;  // at least two
+  // Never null. Effects that look up in them keep the pointer: an hour's copy would be 23 MB.
+  std::shared_ptr<const SensorSamples> gyro =  // readings [rad/s]
+      std::make_shared<SensorSamples>();
+  std::shared_ptr<const SensorSamples> accel =  // specific force in the gyro frame [m/s^2], or none
+      std::make_shared<SensorSamples>();
   double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
   double clock_skew = 0.0;                // that the start has found [s/s]; 0: none
   // Standard deviation of the frames' stamps around a clock where they are times of arrival [s]; 0:

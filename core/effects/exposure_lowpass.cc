@@ -19,13 +19,13 @@ class ExposureLowpass final : public Effect {
       : Effect(recorded ? std::vector<EffectParameter>{{"factor_sq", "", 4.0, 0.0, 4.0}}
                         : std::vector<EffectParameter>{{"exposure_sq", "s^2", 2e-3, 0.0, 4e-3}}),
         derivatives_(setup, RateDerivatives::kSecond) {
-    const auto n = static_cast<Eigen::Index>(derivatives_.times_s.size());
+    const auto n = static_cast<Eigen::Index>(derivatives_.gyro().times_s.size());
     squares_.setOnes(n);
     if (!recorded) return;
     // Of the frame that is exposed, or the next one.
     size_t frame = 0;
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double time_s = derivatives_.times_s[static_cast<size_t>(i)];
+      const double time_s = derivatives_.gyro().times_s[static_cast<size_t>(i)];
       while (frame + 1 < setup.frames.size() &&
              setup.frames[frame].stamp_s + DelayOf(setup, frame) < time_s) {
         ++frame;
@@ -34,8 +34,8 @@ class ExposureLowpass final : public Effect {
     }
   }
   void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
-    const Eigen::Index at = derivatives_.At(time_s);
-    if (at >= 0) columns = -squares_[at] / 24.0 * derivatives_.values.col(at);
+    const Eigen::Index at = derivatives_.IndexAt(time_s);
+    if (at >= 0) columns = -squares_[at] / 24.0 * derivatives_.At(at);
   }
 
  private:

@@ -14,10 +14,11 @@ class GyroAxisDelay final : public Effect {
       : Effect({{"y_after_x", "s", 0.01, -0.05, 0.05}, {"z_after_x", "s", 0.01, -0.05, 0.05}}),
         derivatives_(setup, RateDerivatives::kFirst) {}
   void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
-    const Eigen::Index at = derivatives_.At(time_s);
+    const Eigen::Index at = derivatives_.IndexAt(time_s);
     if (at < 0) return;
-    columns(1, 0) = -derivatives_.values(1, at);
-    columns(2, 1) = -derivatives_.values(2, at);
+    const Eigen::Vector3d slope = derivatives_.At(at);
+    columns(1, 0) = -slope.y();
+    columns(2, 1) = -slope.z();
   }
 
  private:

@@ -1,5 +1,7 @@
 // A gyro that feels forces: its proof mass, or the glue under it, gives way to them.
 #include <algorithm>
+#include <memory>
+#include <vector>
 
 #include "core/effects/entries.h"
 
@@ -14,8 +16,8 @@ class GyroGSensitivity final : public Effect {
   // full: all nine factors, else those of an axis on itself.
   GyroGSensitivity(const EffectSetup& setup, bool full)
       : Effect(Parameters(full)),
-        times_s_(setup.accel_times_s),
-        force_m_s2_(setup.accel_m_s2.colwise() - setup.accel_m_s2.rowwise().mean().eval()) {}
+        accel_(setup.accel),
+        mean_m_s2_(setup.accel->values.rowwise().mean()) {}
   void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
     const Eigen::Vector3d f = ForceAt(time_s);
     if (columns.cols() == 3) {
@@ -41,22 +43,25 @@ class GyroGSensitivity final : public Effect {
 
   // Its difference from the mean, linear between samples and held at the ends.
   Eigen::Vector3d ForceAt(double time_s) const {
-    const auto next = std::lower_bound(times_s_.begin(), times_s_.end(), time_s);
-    if (next == times_s_.begin()) return force_m_s2_.col(0);
-    if (next == times_s_.end()) return force_m_s2_.rightCols<1>();
-    const Eigen::Index i = next - times_s_.begin();
+    const std::vector<double>& times_s = accel_->times_s;
+    const auto next = std::lower_bound(times_s.begin(), times_s.end(), time_s);
+    if (next == times_s.begin()) return Change(0);
+    const Eigen::Index i = next - times_s.begin();
+    if (next == times_s.end()) return Change(i - 1);
     const double u = (time_s - *(next - 1)) / (*next - *(next - 1));
-    return (1.0 - u) * force_m_s2_.col(i - 1) + u * force_m_s2_.col(i);
+    return (1.0 - u) * Change(i - 1) + u * Change(i);
   }
 
-  const std::vector<double> times_s_;
-  const Eigen::Matrix3Xd force_m_s2_;
+  Eigen::Vector3d Change(Eigen::Index i) const { return accel_->values.col(i) - mean_m_s2_; }
+
+  const std::shared_ptr<const SensorSamples> accel_;
+  const Eigen::Vector3d mean_m_s2_;
 };
 
 // Samples at 20 Hz or more while the frames are taken: slower ones miss the forces of a step.
 bool HasForces(const EffectSetup& setup) {
   constexpr double kSlowestHz = 20.0;
-  const std::vector<double>& times_s = setup.accel_times_s;
+  const std::vector<double>& times_s = setup.accel->times_s;
   if (times_s.size() < 2) return false;
   const double rate_hz =
       static_cast<double>(times_s.size() - 1) / (times_s.back() - times_s.front());

@@ -15,8 +15,8 @@ class GyroLowpass final : public Effect {
       : Effect({{"time_constant_sq", "s^2", 4e-4, 0.0, 4e-3}}),
         derivatives_(setup, RateDerivatives::kSecond) {}
   void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
-    const Eigen::Index at = derivatives_.At(time_s);
-    if (at >= 0) columns = 0.5 * derivatives_.values.col(at);
+    const Eigen::Index at = derivatives_.IndexAt(time_s);
+    if (at >= 0) columns = 0.5 * derivatives_.At(at);
   }
 
  private:

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
+#include <vector>
 
 #include "core/effects/entries.h"
 
@@ -16,19 +18,19 @@ class OpticalStabilisation final : public Effect {
  public:
   OpticalStabilisation(const EffectSetup& setup, double corner_hz)
       : Effect({{"shift_per_rad", "px/rad", 500.0, 30.0, 1e4}}),
-        times_s_(setup.gyro_times_s),
+        gyro_(setup.gyro),
         delays_s_(setup.frame_delays_s),
         readout_s_(setup.readout_s) {
     for (const FrameTime& frame : setup.frames) stamps_s_.push_back(frame.stamp_s);
     delays_s_.resize(stamps_s_.size(), setup.delay_s);
     const double a = 2.0 * M_PI * corner_hz;
-    const auto n = static_cast<Eigen::Index>(times_s_.size());
-    const Eigen::Vector3d mean = setup.gyro_rad_s.rowwise().mean();  // the bias, nearly
-    const Eigen::Matrix3Xd omega =
-        setup.R_gyro_cam.transpose() * (setup.gyro_rad_s.colwise() - mean);
+    const std::vector<double>& times_s = gyro_->times_s;
+    const auto n = static_cast<Eigen::Index>(times_s.size());
+    const Eigen::Vector3d mean = gyro_->values.rowwise().mean();  // the bias, nearly
+    const Eigen::Matrix3Xd omega = setup.R_gyro_cam.transpose() * (gyro_->values.colwise() - mean);
     angle_.setZero(2, n);
     for (Eigen::Index i = 1; i < n; ++i) {
-      const double dt = times_s_[static_cast<size_t>(i)] - times_s_[static_cast<size_t>(i) - 1];
+      const double dt = times_s[static_cast<size_t>(i)] - times_s[static_cast<size_t>(i) - 1];
       const double decay = std::exp(-a * dt);
       const Eigen::Vector2d input = 0.5 * (decay * omega.col(i - 1) + omega.col(i)).head<2>();
       angle_.col(i) = decay * angle_.col(i - 1) + dt * input;
@@ -39,9 +41,10 @@ class OpticalStabilisation final : public Effect {
     if (frame == stamps_s_.end()) return;
     const double delay_s = delays_s_[static_cast<size_t>(frame - stamps_s_.begin())];
     const double t = o.frame.stamp_s + delay_s + readout_s_ * o.px.y() / o.size_px.y();
-    const auto next = std::lower_bound(times_s_.begin(), times_s_.end(), t);
-    if (next == times_s_.begin() || next == times_s_.end()) return;
-    const Eigen::Index i = next - times_s_.begin();
+    const std::vector<double>& times_s = gyro_->times_s;
+    const auto next = std::lower_bound(times_s.begin(), times_s.end(), t);
+    if (next == times_s.begin() || next == times_s.end()) return;
+    const Eigen::Index i = next - times_s.begin();
     const double u = (t - *(next - 1)) / (*next - *(next - 1));
     const Eigen::Vector2d angle = (1.0 - u) * angle_.col(i - 1) + u * angle_.col(i);
     columns(kCx, 0) = angle.y();
@@ -50,7 +53,7 @@ class OpticalStabilisation final : public Effect {
   bool depends_on_calibration() const override { return true; }
 
  private:
-  const std::vector<double> times_s_;
+  const std::shared_ptr<const SensorSamples> gyro_;
   std::vector<double> stamps_s_, delays_s_;  // of the frames
   const double readout_s_;
   Eigen::Matrix2Xd angle_;

@@ -3,24 +3,32 @@
 #define CAMGYRO_CORE_EFFECTS_RATE_DERIVATIVES_H_
 
 #include <Eigen/Core>
-#include <vector>
+#include <memory>
 
 #include "core/effects/effect.h"
 
 namespace camgyro {
 
 // The first or the second, of least-squares parabolas over 25 ms (at least 2 samples) to both sides
-// of each sample; zero at the ends. One of them only: hours have millions of samples.
-struct RateDerivatives {
+// of each sample; zero at the ends. Made where they are asked for: hours have millions of samples,
+// of which a fit uses few.
+class RateDerivatives {
+ public:
   enum Order { kFirst = 1, kSecond = 2 };
   RateDerivatives(const EffectSetup& setup, Order order);
   // The sample at a time, or the first after it; -1 past the end.
-  Eigen::Index At(double time_gyro_s) const;
+  Eigen::Index IndexAt(double time_gyro_s) const;
+  // At a sample [rad/s^2] or [rad/s^3].
+  Eigen::Vector3d At(Eigen::Index sample) const;
+  const SensorSamples& gyro() const { return *gyro_; }
   // Samples come every 25 ms or faster, and there are enough of them.
   static bool Possible(const EffectSetup& setup);
 
-  std::vector<double> times_s;
-  Eigen::Matrix3Xd values;  // columns: samples [rad/s^2] or [rad/s^3]
+ private:
+  const std::shared_ptr<const SensorSamples> gyro_;
+  const Order order_;
+  const Eigen::Index half_;  // samples to either side
+  const double unit_s_;      // of time, in the parabola
 };
 
 }  // namespace camgyro

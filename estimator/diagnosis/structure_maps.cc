@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "estimator/diagnosis/structure.h"
 
@@ -194,32 +195,37 @@ class MapMaker {
 
   // Over the rates and their slopes while the camera ran. False if they are too few.
   bool AddRates(const Eigen::Vector3d& bias_rad_s) {
-    const auto n = static_cast<Eigen::Index>(setup_.gyro_times_s.size());
+    const std::vector<double>& times_s = setup_.gyro->times_s;
+    const Eigen::Matrix3Xd& readings = setup_.gyro->values;
+    const auto n = static_cast<Eigen::Index>(times_s.size());
     std::array<std::vector<double>, 3> rates, slopes;
-    Eigen::Matrix3Xd slope = Eigen::Matrix3Xd::Zero(3, n);
-    const double interval = (setup_.gyro_times_s.back() - setup_.gyro_times_s.front()) / (n - 1.0);
+    const double interval = (times_s.back() - times_s.front()) / (n - 1.0);
     const auto reach = std::max<Eigen::Index>(1, std::llround(kSlopeReachS / interval));
+    const auto slope_at = [gyro = setup_.gyro, reach, n](Eigen::Index i) -> Eigen::Vector3d {
+      if (i < reach || i + reach >= n) return Eigen::Vector3d::Zero();
+      const auto before = static_cast<size_t>(i - reach), after = static_cast<size_t>(i + reach);
+      return (gyro->values.col(i + reach) - gyro->values.col(i - reach)) /
+             (gyro->times_s[after] - gyro->times_s[before]);
+    };
     for (Eigen::Index i = reach; i + reach < n; ++i) {
-      const auto at = static_cast<size_t>(i), step = static_cast<size_t>(reach);
-      slope.col(i) = (setup_.gyro_rad_s.col(i + reach) - setup_.gyro_rad_s.col(i - reach)) /
-                     (setup_.gyro_times_s[at + step] - setup_.gyro_times_s[at - step]);
-      if (setup_.gyro_times_s[at] < from_s_ || setup_.gyro_times_s[at] > to_s_) continue;
+      const double time_s = times_s[static_cast<size_t>(i)];
+      if (time_s < from_s_ || time_s > to_s_) continue;
+      const Eigen::Vector3d slope = slope_at(i);
       for (size_t k = 0; k < 3; ++k) {
         const auto axis = static_cast<Eigen::Index>(k);
-        rates[k].push_back(setup_.gyro_rad_s(axis, i) - bias_rad_s[axis]);
-        slopes[k].push_back(slope(axis, i));
+        rates[k].push_back(readings(axis, i) - bias_rad_s[axis]);
+        slopes[k].push_back(slope[axis]);
       }
     }
     if (rates[0].size() < kLeastRates) return false;
     AddOverValue("rate error over the rate", "rate about x [rad/s]", rates,
                  [](double, const Eigen::Vector3d& w) { return w; });
-    AddOverValue(
-        "rate error over the angular acceleration", "slope of the rate about x [rad/s^2]", slopes,
-        [slope, times = setup_.gyro_times_s](double t, const Eigen::Vector3d&) {
-          const auto it = std::lower_bound(times.begin(), times.end(), t - 1e-9);
-          const auto last = static_cast<Eigen::Index>(times.size()) - 1;
-          return Eigen::Vector3d(slope.col(std::min<Eigen::Index>(it - times.begin(), last)));
-        });
+    AddOverValue("rate error over the angular acceleration", "slope of the rate about x [rad/s^2]",
+                 slopes, [slope_at, gyro = setup_.gyro, n](double t, const Eigen::Vector3d&) {
+                   const auto it =
+                       std::lower_bound(gyro->times_s.begin(), gyro->times_s.end(), t - 1e-9);
+                   return slope_at(std::min(it - gyro->times_s.begin(), n - 1));
+                 });
     return true;
   }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "core/robust_statistics.h"
 #include "core/saturation.h"
@@ -112,18 +114,20 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
       setup.frame_delays_s.push_back(DelayOf(calibration, frame));
     }
   }
-  setup.gyro_rad_s.resize(3, static_cast<Eigen::Index>(recording.gyro.size()));
+  auto gyro = std::make_shared<SensorSamples>();
+  gyro->values.resize(3, static_cast<Eigen::Index>(recording.gyro.size()));
   for (const GyroSample& sample : recording.gyro) {
-    setup.gyro_rad_s.col(static_cast<Eigen::Index>(setup.gyro_times_s.size())) =
-        sample.omega_gyro_rad_s;
-    setup.gyro_times_s.push_back(SecondsSince(origin_ns, sample.stamp_ns));
+    gyro->values.col(static_cast<Eigen::Index>(gyro->times_s.size())) = sample.omega_gyro_rad_s;
+    gyro->times_s.push_back(SecondsSince(origin_ns, sample.stamp_ns));
   }
-  setup.accel_m_s2.resize(3, static_cast<Eigen::Index>(recording.accel.size()));
+  setup.gyro = std::move(gyro);
+  auto accel = std::make_shared<SensorSamples>();
+  accel->values.resize(3, static_cast<Eigen::Index>(recording.accel.size()));
   for (const AccelSample& sample : recording.accel) {
-    setup.accel_m_s2.col(static_cast<Eigen::Index>(setup.accel_times_s.size())) =
-        sample.accel_gyro_m_s2;
-    setup.accel_times_s.push_back(SecondsSince(origin_ns, sample.stamp_ns));
+    accel->values.col(static_cast<Eigen::Index>(accel->times_s.size())) = sample.accel_gyro_m_s2;
+    accel->times_s.push_back(SecondsSince(origin_ns, sample.stamp_ns));
   }
+  setup.accel = std::move(accel);
   return setup;
 }
 

@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <memory>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "core/so3.h"
 
@@ -125,11 +128,13 @@ TEST(PairModel, BackpropagationByEffectsMatchesDifferences) {
   for (int i = 0; i < 30; ++i) setup.frames.push_back({i / 3.0, 0.003 + 0.001 * (i % 5)});
   std::mt19937_64 generator(3);
   std::normal_distribution<double> normal;
-  setup.gyro_rad_s.resize(3, 2400);
+  SensorSamples gyro;
+  gyro.values.resize(3, 2400);
   for (int i = 0; i < 2400; ++i) {
-    setup.gyro_times_s.push_back(0.005 * i);
-    setup.gyro_rad_s.col(i) << std::sin(0.02 * i), std::cos(0.03 * i), std::sin(0.01 * i);
+    gyro.times_s.push_back(0.005 * i);
+    gyro.values.col(i) << std::sin(0.02 * i), std::cos(0.03 * i), std::sin(0.01 * i);
   }
+  setup.gyro = std::make_shared<SensorSamples>(std::move(gyro));
   const Result<EffectSet> set = MakeEffects(
       "radial_distortion,tangential_distortion,aspect_ratio,focal_drift:curve,"
       "optical_stabilisation:0.5,clock_skew,delay_step:4.1,delay_wander,readout_direction,"

@@ -109,8 +109,8 @@ TEST(Device, CombinesFittedEffectsOfTheDevice) {
   EffectSetup setup;
   setup.size_px = {720.0, 480.0};
   setup.frames = {FrameTime(0.0), FrameTime(10.0)};
-  setup.gyro_times_s = {0.0, 10.0};
-  setup.gyro_rad_s = Eigen::Matrix3Xd::Zero(3, 2);
+  setup.gyro =
+      std::make_shared<SensorSamples>(SensorSamples{{0.0, 10.0}, Eigen::Matrix3Xd::Zero(3, 2)});
   std::vector<CalibrationReport> reports;
   for (unsigned i = 0; i < 4; ++i) {
     reports.push_back(Report(20 + i, 0.01));

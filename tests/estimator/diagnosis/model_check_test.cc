@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "core/effects/catalogue.h"
@@ -248,13 +249,15 @@ TEST(ModelCheck, MeasuredDelaysThatJitterAreDoubted) {
 TEST(DeviceClass, TheTableNamesEffectsOfTheCatalogue) {
   EffectSetup setup;
   setup.size_px = {720.0, 480.0};
+  SensorSamples gyro;
   for (int i = 0; i < 300; ++i) {
     setup.frames.push_back(FrameTime(i / 30.0, 0.005 + 0.002 * (i % 3)));
-    setup.gyro_times_s.push_back(i / 30.0);
+    gyro.times_s.push_back(i / 30.0);
   }
-  setup.gyro_rad_s = Eigen::Matrix3Xd::Random(3, 300);
-  setup.accel_times_s = setup.gyro_times_s;
-  setup.accel_m_s2 = 9.8 * Eigen::Matrix3Xd::Random(3, 300);
+  gyro.values = Eigen::Matrix3Xd::Random(3, 300);
+  setup.gyro = std::make_shared<SensorSamples>(gyro);
+  setup.accel = std::make_shared<SensorSamples>(
+      SensorSamples{gyro.times_s, 9.8 * Eigen::Matrix3Xd::Random(3, 300)});
   for (const UsualEffect& usual : UsualEffects()) {
     const EffectEntry* entry = FindEffect(usual.effect);
     ASSERT_NE(entry, nullptr) << usual.effect;
