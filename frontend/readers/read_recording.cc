@@ -38,6 +38,9 @@ Result<Recording> ReadRecording(const std::string& path, const ReadOptions& opti
   Result<Recording> recording = ReadAsRecorded(path);
   if (!recording) return recording;
   RepairStamps(options.stamps, &*recording);
+  // Of an hour, these have grown to 10 MB more than they hold.
+  recording->gyro.shrink_to_fit();
+  recording->accel.shrink_to_fit();
   if (options.strict && !recording->faults.empty()) {
     return BadInput("with strict reading: " + recording->faults.front().finding);
   }
