@@ -37,7 +37,10 @@ class OnlinePass {
   const SlidingWindow& window() const { return window_; }
   bool has_estimate() const { return !trace_.empty(); }
   // Every update so far; gives them away.
-  std::vector<WindowUpdate> TakeTrace() { return std::move(trace_); }
+  std::vector<WindowUpdate> TakeTrace() {
+    trace_.shrink_to_fit();  // of an hour, 74 MB had room for 36 000 more
+    return std::move(trace_);
+  }
 
  private:
   // The next pair, with the samples before it.

@@ -1,7 +1,9 @@
 #include "estimator/diagnosis/diagnose.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "core/free_memory.h"
 #include "core/usual_focal.h"
 #include "estimator/astray.h"
 #include "estimator/diagnosis/step_time.h"
@@ -97,10 +99,10 @@ void CalibrateWith(const Calibration& found, const LoopInput& input,
   PlaceDelaySteps(recording, all, all.pairs, kStepMarginBlocks * diagnosis->block_s, input.noise,
                   input.graph, &*with.from);
   with.online = false;
-  const Result<CalibrationReport> after =
+  Result<CalibrationReport> after =
       CalibrateRecording(recording, rotations_at, with, Part(progress, 0.0, 1.0));
   if (after) {
-    diagnosis->after = *after;
+    diagnosis->after = *std::move(after);
   } else {
     diagnosis->before->doubts.push_back(
         "this calibration is without the effects: with them, the fit of all frames failed: " +
@@ -125,7 +127,7 @@ Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOpti
   const Recording& recording = *to_repair;
   Diagnosis diagnosis;
   diagnosis.faults = FindDataFaults(recording);
-  const Result<CalibrationReport> before =
+  Result<CalibrationReport> before =
       CalibrateOrSayWhy(rotations_at, options.calibrate, progress, to_repair, &diagnosis.faults);
   for (const DataFault& fault : diagnosis.faults) {
     if (FindEffect(fault.name) != nullptr) AddUnique(fault.name, &diagnosis.effects);
@@ -134,8 +136,9 @@ Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOpti
     diagnosis.refusal = before.error();
     return diagnosis;
   }
-  diagnosis.before = *before;
-  diagnosis.times = before->times;
+  diagnosis.before = *std::move(before);
+  diagnosis.times = diagnosis.before->times;
+  GiveBackFreeMemory();  // of the calibration, before the loop takes as much again
 
   const CalibrationReport& report = *diagnosis.before;
   LoopInput input;

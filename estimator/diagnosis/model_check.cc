@@ -82,7 +82,8 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
 
   EstimationInput input = OutlineOf(recording, SelectPairs(recording));
   TakeNoiseFactors(report.noise_factors, &input.pairs);
-  const Shares shares = MakeShares(recording, input, {kMostFitPairs, kMostFitPairs, false});
+  const Shares shares =
+      MakeShares(recording, input, {kMostFitPairs, kMostFitPairs, 0, /*with_report=*/false});
   const PairGraphOptions graph = GraphOptionsFor(recording, report.start, options.window.graph);
   const auto scores_of = [&](const std::vector<PairBlock>& blocks) {
     return ComputeScores(input, blocks, model, set, report.quality.noise_px, graph);

@@ -26,19 +26,20 @@ SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
     : in_(in),
       options_(options),
       input_(OutlineWithNoise(in)),
-      shares_(MakeShares(*in.recording, input_, {kMostFitPairs, kMostChoicePairs})) {
+      shares_(
+          MakeShares(*in.recording, input_, {kMostFitPairs, kMostChoicePairs, kMostReportPairs})) {
   const auto shares_of = [&](const PairSelection& selection, const ShareLimits& limits) {
     return MakeShares(*in.recording, OutlineOf(*in.recording, selection), limits);
   };
   const bool reanchored = in.recording->match_noise == MatchNoise::kSecondImage;
   const PairSelection near = SelectPairs(*in.recording, {reanchored ? kNearestGap : kNearGap});
-  map_pairs_ = shares_of(near, {kMostFitPairs, kMostChoicePairs, /*with_report=*/false}).choice;
+  map_pairs_ = shares_of(near, {kMostFitPairs, kMostChoicePairs, 0, /*with_report=*/false}).choice;
   if (in.recording->HasOnlyAttitudes()) return;
   // So that no two of them share noise: as far apart as the others, and where a tracker re-anchors,
   // one after the other.
   const int stride = reanchored ? kNearestGap : SelectPairs(*in.recording).stride;
   const Shares nearest =
-      shares_of({kNearestGap, stride}, {kMostFitPairs, kMostFitPairs, /*with_report=*/false});
+      shares_of({kNearestGap, stride}, {kMostFitPairs, kMostFitPairs, 0, /*with_report=*/false});
   near_pairs_ = Joined(nearest.fit);
   const std::vector<TimedPair> choice = Joined(nearest.choice);
   near_pairs_.insert(near_pairs_.end(), choice.begin(), choice.end());

@@ -104,6 +104,7 @@ Shares MakeShares(const Recording& recording, const EstimationInput& input,
   if (recording.HasOnlyAttitudes()) return shares;
   Thin(limits.fit, &shares.fit);
   Thin(limits.choice, &shares.choice);
+  Thin(limits.report, &shares.report);
   AddMatches(recording, &shares.fit);
   AddMatches(recording, &shares.choice);
   if (!has_tracks || shares.report_shares_tracks) AddMatches(recording, &shares.report);

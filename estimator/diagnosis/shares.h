@@ -29,7 +29,7 @@ struct Shares {
 // How many pairs of recordings with pixels stay in a share: every n-th.
 struct ShareLimits {
   static constexpr size_t kAll = std::numeric_limits<size_t>::max();
-  size_t fit = kAll, choice = kAll;
+  size_t fit = kAll, choice = kAll, report = kAll;
   bool with_report = true;  // false: `report` stays empty
 };
 

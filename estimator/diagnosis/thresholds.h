@@ -32,6 +32,8 @@ constexpr int kLeastFitPairs = 25, kLeastChoicePairs = 25;
 // Of recordings with pixels. A fit needs no more to tell effects apart: what it gets wrong within
 // its noise is projected out of the test. Time is spent on the refits.
 constexpr size_t kMostFitPairs = 400, kMostChoicePairs = 800;
+// Of the frames that show what was gained: an hour's would be 10 000, with 90 MB of matches.
+constexpr size_t kMostReportPairs = 2000;
 // Of the maps [frames]: what comes and goes within some frames is to be seen
 // (FindEffects.NamesAPeriodicGlitchOfTheStamps).
 constexpr int kNearGap = 3;

@@ -56,12 +56,30 @@ TEST(Shares, WithoutReportTheOthersAreTheSame) {
   const Recording recording = Tracks(15.0);
   const EstimationInput input = OutlineOf(recording);
   const Shares all = MakeShares(recording, input);
-  const Shares without = MakeShares(recording, input, {100, 100, false});
+  const Shares without = MakeShares(recording, input, {100, 100, 50, false});
   EXPECT_TRUE(without.report.empty());
   EXPECT_EQ(without.fit.size(), all.fit.size());
   EXPECT_EQ(without.choice.size(), all.choice.size());
   EXPECT_LE(Joined(without.fit).size(), 100u);
   EXPECT_FALSE(without.fit.front().front().matches.empty());
+}
+
+// Every n-th pair of those that would be there, with the tracks that the other shares do not see.
+TEST(Shares, AreThinned) {
+  const Recording recording = Tracks(15.0);
+  const EstimationInput input = OutlineOf(recording);
+  const std::vector<TimedPair> all = Joined(MakeShares(recording, input).report);
+  ASSERT_GT(all.size(), 20u);
+  const Shares shares = MakeShares(recording, input, {100, 100, 20});
+  const std::vector<TimedPair> report = Joined(shares.report);
+  EXPECT_LE(report.size(), 20u);
+  EXPECT_GE(report.size(), 10u);
+  EXPECT_FALSE(shares.report_shares_tracks);
+  const size_t stride = (all.size() + 19) / 20;
+  for (size_t i = 0; i < report.size(); ++i) {
+    EXPECT_EQ(report[i].frame_a, all[i * stride].frame_a);
+    EXPECT_EQ(report[i].matches.size(), all[i * stride].matches.size());
+  }
 }
 
 // Each holds scores of all candidates: an hour has no more than a quarter of it.
