@@ -69,6 +69,7 @@ Status RunExport(const std::vector<std::string>& arguments) {
   if (!calibration) return tl::unexpected(calibration.error());
   const Result<std::vector<std::string>> effects = ReadEffectNames(arguments[0]);
   if (!effects) return tl::unexpected(effects.error());
+  Recording of_densities;
   ExportInput input;
   input.source = std::filesystem::path(arguments[0]).filename().string();
   input.calibration = *calibration;
@@ -84,7 +85,8 @@ Status RunExport(const std::vector<std::string>& arguments) {
                       " is of " + std::to_string(calibration->width_px) + " x " +
                       std::to_string(calibration->height_px) + "; expected the same");
     }
-    input.recording = std::move(*recording);
+    of_densities = std::move(*recording);
+    input.recording = &of_densities;
   }
 
   std::vector<std::string> names;

@@ -85,7 +85,7 @@ Status WriteTables(const Rectified& rectified, const ExportFormat* format,
   ExportInput input;
   input.source = fs::path(FLAGS_calibration).filename().string() + ", rectified";
   input.calibration = rectified.calibration;
-  input.recording = recording;
+  input.recording = &recording;
   for (ExportedFile& file : FindExportFormat("euroc")->make(input)) {
     files.Add(file.name, std::move(file.text));
   }
@@ -132,7 +132,7 @@ Status RunRectify(const std::vector<std::string>& arguments) {
   RectifyOptions options;
   options.undistort = FLAGS_undistort;
   options.remove_bias = FLAGS_remove_bias;
-  const Result<Rectified> rectified = Rectify(*recording, *calibration, options);
+  const Result<Rectified> rectified = Rectify(*calibration, options, &*recording);
   if (!rectified) return tl::unexpected(rectified.error());
   if (recording->HasImages()) {
     ProgressBar bar;

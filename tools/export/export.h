@@ -9,7 +9,6 @@
 #ifndef CAMGYRO_TOOLS_EXPORT_EXPORT_H_
 #define CAMGYRO_TOOLS_EXPORT_EXPORT_H_
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,8 +22,8 @@ struct ExportInput {
   std::string source;  // name of the calibration file, for comments
   Calibration calibration;
   // Brings noise densities, rates, and the samples of a gyro log. Without it: typical values,
-  // marked.
-  std::optional<Recording> recording;
+  // marked. Outlives the input.
+  const Recording* recording = nullptr;
 };
 
 struct ExportedFile {

@@ -50,14 +50,12 @@ CameraGuess GuessOf(const Calibration& c) {
   return guess;
 }
 
-// The points of one frame, and the sum of the squares of their shifts [px^2].
-std::pair<std::vector<TrackedPoint>, double> RectifyPoints(const FrameWarp& warp,
-                                                           const Calibration& c,
-                                                           const std::vector<TrackedPoint>& all) {
-  std::vector<TrackedPoint> points;
-  points.reserve(all.size());
+// The points of one frame; returns the sum of the squares of their shifts [px^2].
+double RectifyPoints(const FrameWarp& warp, const Calibration& c,
+                     std::vector<TrackedPoint>* points) {
   double squares = 0.0;
-  for (TrackedPoint point : all) {
+  size_t kept = 0;
+  for (TrackedPoint point : *points) {
     const auto px = warp.ToVirtual(point.px);
     if (!px || px->x() < -0.5 || px->y() < -0.5 || px->x() > c.width_px - 0.5 ||
         px->y() > c.height_px - 0.5) {
@@ -65,15 +63,17 @@ std::pair<std::vector<TrackedPoint>, double> RectifyPoints(const FrameWarp& warp
     }
     squares += (*px - point.px).squaredNorm();
     point.px = *px;
-    points.push_back(point);
+    (*points)[kept++] = point;
   }
-  return {std::move(points), squares};
+  points->resize(kept);
+  return squares;
 }
 
 }  // namespace
 
-Result<Rectified> Rectify(const Recording& recording, const Calibration& calibration,
-                          const RectifyOptions& options) {
+Result<Rectified> Rectify(const Calibration& calibration, const RectifyOptions& options,
+                          Recording* to_empty) {
+  const Recording& recording = *to_empty;
   if (!recording.HasImages() && recording.tracks.empty()) {
     return BadInput(recording.path + ": has neither pictures nor tracks to rectify");
   }
@@ -107,12 +107,11 @@ Result<Rectified> Rectify(const Recording& recording, const Calibration& calibra
     out.frames.push_back(moved);
     if (recording.tracks.empty()) continue;
     const FrameWarp warp = WarpOf(path, calibration, frame, rectified.calibration);
-    auto [kept, sum] =
-        RectifyPoints(warp, calibration, recording.tracks[static_cast<size_t>(frame)]);
-    points += kept.size();
-    squares += sum;
-    out.tracks.push_back(std::move(kept));
+    out.tracks.push_back(std::move(to_empty->tracks[static_cast<size_t>(frame)]));
+    squares += RectifyPoints(warp, calibration, &out.tracks.back());
+    points += out.tracks.back().size();
   }
+  to_empty->tracks.clear();
   if (points > 0) rectified.shift_px = std::sqrt(squares / static_cast<double>(points));
   return rectified;
 }

@@ -31,9 +31,10 @@ struct Rectified {
 
 // Only rotation is undone: what the camera moves while a picture is read out stays in it. Errors:
 // kBadInput if the recording has neither pictures nor tracks, is of another size than the
-// calibration, or no two frames lie within the gyro's time.
-Result<Rectified> Rectify(const Recording& recording, const Calibration& calibration,
-                          const RectifyOptions& options);
+// calibration, or no two frames lie within the gyro's time. The recording's tracks are taken away
+// (of an hour they are half a gigabyte): there are none left after success.
+Result<Rectified> Rectify(const Calibration& calibration, const RectifyOptions& options,
+                          Recording* recording);
 
 // The pictures of Rectify's result, 8-bit grey, as files of their names in `folder`, which has to
 // exist; black where nothing was recorded. Errors: kBadInput for pictures that cannot be read or

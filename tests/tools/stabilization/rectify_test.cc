@@ -40,7 +40,8 @@ TEST(Rectify, FramesAreAsOfAGlobalShutterOnTheGyrosClock) {
   for (const bool undistort : {false, true}) {
     RectifyOptions options;
     options.undistort = options.remove_bias = undistort;
-    const auto rectified = Rectify(s.recording, s.truth, options);
+    Recording recorded = s.recording;
+    const auto rectified = Rectify(s.truth, options, &recorded);
     ASSERT_TRUE(rectified) << rectified.error().message;
     EXPECT_EQ(rectified->calibration.readout_s, 0.0);
     EXPECT_EQ(rectified->calibration.delay_s, 0.0);
@@ -61,7 +62,8 @@ TEST(Rectify, FramesAreAsOfAGlobalShutterOnTheGyrosClock) {
   // Taken for granted, the readout leaves more than it should.
   Calibration without = s.truth;
   without.readout_s = 0.0;
-  EXPECT_GT(Turned(*Rectify(s.recording, without, {})), 0.5);
+  Recording recorded = s.recording;
+  EXPECT_GT(Turned(*Rectify(without, {}, &recorded)), 0.5);
 }
 
 TEST(Rectify, DropsWhatLeavesThePictureOrTheGyrosTime) {
@@ -70,7 +72,7 @@ TEST(Rectify, DropsWhatLeavesThePictureOrTheGyrosTime) {
   size_t points = 0, kept = 0;
   for (const auto& frame : s.recording.tracks) points += frame.size();
   s.recording.gyro.erase(s.recording.gyro.begin(), s.recording.gyro.begin() + 140);
-  const auto rectified = Rectify(s.recording, s.truth, {});
+  const auto rectified = Rectify(s.truth, {}, &s.recording);
   ASSERT_TRUE(rectified) << rectified.error().message;
   EXPECT_GT(rectified->first_frame, 3);
   EXPECT_EQ(rectified->frames_dropped, rectified->first_frame);
@@ -92,12 +94,12 @@ TEST(Rectify, RefusesWhatItCannotTurn) {
   simulation::Simulated s = Turning();
   Calibration other = s.truth;
   other.delay_s = 1e4;
-  EXPECT_THAT(Rectify(s.recording, other, {}).error().message, HasSubstr("gyro's time"));
+  EXPECT_THAT(Rectify(other, {}, &s.recording).error().message, HasSubstr("gyro's time"));
   other = s.truth;
   other.width_px = 100;
-  EXPECT_THAT(Rectify(s.recording, other, {}).error().message, HasSubstr("expected 100 x"));
+  EXPECT_THAT(Rectify(other, {}, &s.recording).error().message, HasSubstr("expected 100 x"));
   s.recording.tracks.clear();
-  EXPECT_THAT(Rectify(s.recording, s.truth, {}).error().message,
+  EXPECT_THAT(Rectify(s.truth, {}, &s.recording).error().message,
               HasSubstr("neither pictures nor tracks"));
 }
 
