@@ -253,11 +253,11 @@ class Loop {
     if (progress_) progress_("diagnosis", 1.0 - std::pow(0.5, round + share));
   }
 
-  RoundScores Score() const {
+  RoundScores Score(EffectSetup setup) const {
     const Calibration& model = fit_.calibration;
     const double noise = fit_.quality.noise_px;
     RoundScores round;
-    round.setup = MakeEffectSetup(*in_.recording, model);
+    round.setup = std::move(setup);
     round.candidates = MissingEffects(model, round.setup);
     auto set = std::make_shared<EffectSet>();
     const int present = kStateSize + static_cast<int>(model.effect_values.size());
@@ -287,9 +287,11 @@ class Loop {
   bool Round(int round, bool may_add, DiagnosisRound* result) {
     const double noise = fit_.quality.noise_px;
     Tell(round, 0.1);
-    const RoundScores scores = Score();
+    EffectSetup setup = MakeEffectSetup(*in_.recording, fit_.calibration);
+    // Before the candidates: of an hour, the scores of either are 50 MB and more.
+    last_maps_ = Maps(setup);
     Tell(round, 0.2);
-    last_maps_ = Maps(scores.setup);
+    const RoundScores scores = Score(std::move(setup));
     result->before = result->after =
         Summarise(fits_.ScoresOf(fits_.shares().report, fit_.calibration, nullptr, noise), noise);
     const bool delay_moves = DelayMoves(last_maps_, options_.significance);
