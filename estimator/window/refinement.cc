@@ -12,7 +12,6 @@
 #include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/yardstick.h"
-#include "factors/robust.h"
 
 namespace camgyro {
 namespace {
@@ -33,33 +32,6 @@ double LargestShift(const std::vector<TimedPair>& pairs, const Calibration& a,
   }
   return largest;
 }
-
-// How well matches fit.
-class FitSum {
- public:
-  FitSum(const PairGraphOptions& options, int per_match)
-      : options_(options), per_match_(per_match) {}
-  // Independent residuals of a pair, in sigmas, without loss. factor: of its noise.
-  void Add(const std::vector<double>& residuals, double factor) {
-    for (size_t i = 0; i < residuals.size(); i += static_cast<size_t>(per_match_)) {
-      const double length = Eigen::Map<const Eigen::VectorXd>(&residuals[i], per_match_).norm();
-      const double bounded = Robustify(length, options_.robust_threshold).value;
-      sum_sq_ += factor * factor * bounded * bounded;
-      inliers_ += length <= options_.inlier_sigmas() ? 1 : 0;
-      ++matches_;
-    }
-  }
-  int matches() const { return matches_; }
-  // Per residual, in sigmas of a pair whose factor is 1.
-  double rms() const { return std::sqrt(sum_sq_ / std::max(1, per_match_ * matches_)); }
-  double inlier_ratio() const { return static_cast<double>(inliers_) / std::max(1, matches_); }
-
- private:
-  const PairGraphOptions& options_;
-  const int per_match_;
-  double sum_sq_ = 0.0;
-  int inliers_ = 0, matches_ = 0;
-};
 
 // The spread of the frames' own times, if they have any, for the next solve. True if it has
 // settled: within a share, as the scale of the noise, or so small that no match shows it.
@@ -380,29 +352,6 @@ void TakeNoiseFactors(const std::map<int64_t, double>& factors, std::vector<Time
     const auto known = factors.find(pair.id);
     if (known != factors.end()) pair.noise_factor = known->second;
   }
-}
-
-UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-                         const Calibration& calibration, double noise_px,
-                         const PairGraphOptions& options) {
-  UnseenFit fit;
-  FitSum sum(options, options.residual->facts().per_match);
-  std::vector<std::optional<std::vector<double>>> of_pairs(pairs.size());
-  ParallelFor(pairs.size(), [&](size_t i) {
-    std::vector<double> residuals;
-    if (ResidualOf(pairs[i], options)
-            .Unseen(input, pairs[i], calibration, noise_px, options, &residuals)) {
-      of_pairs[i] = std::move(residuals);
-    }
-  });
-  for (size_t i = 0; i < pairs.size(); ++i) {
-    if (!of_pairs[i]) continue;
-    ++fit.pairs;
-    sum.Add(*of_pairs[i], pairs[i].noise_factor);
-  }
-  fit.matches = sum.matches();
-  fit.rms_px = noise_px * sum.rms();
-  return fit;
 }
 
 }  // namespace camgyro

@@ -12,6 +12,7 @@
 #include "core/calibration.h"
 #include "core/result.h"
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/fit_quality.h"
 #include "estimator/window/frame_times.h"
 #include "estimator/window/frame_wander.h"
 #include "estimator/window/pair_graph_options.h"
@@ -51,16 +52,6 @@ struct RefinementOptions {
   std::shared_ptr<const PairLatents> latents;
 };
 
-struct FitQuality {
-  int pairs = 0;              // used
-  int matches = 0;            // in them
-  double inlier_ratio = 0.0;  // share of matches within PairGraphOptions::inlier_sigmas
-  double noise_px = 0.0;      // robust standard deviation per axis (attitudes: rad)
-  // How that scatters from pair to pair: rms of the logarithms of the pairs' factors.
-  double noise_scatter = 0.0;
-  double rms_px = 0.0;  // of residuals, each bounded by the loss
-};
-
 struct Refined {
   Calibration calibration;
   FitQuality quality;
@@ -82,19 +73,6 @@ Result<Refined> Refine(const EstimationInput& input, const std::vector<TimedPair
 
 // Gives pairs the noise that a fit has found for them; those that it has not keep theirs.
 void TakeNoiseFactors(const std::map<int64_t, double>& factors, std::vector<TimedPair>* pairs);
-
-// Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
-// direction of each pair (and its frames' own times, if they have any) from every other match,
-// residuals from the rest. A transfer has no
-// direction: residuals from all matches.
-struct UnseenFit {
-  int pairs = 0;
-  int matches = 0;
-  double rms_px = 0.0;  // bounded by the loss, as FitQuality::rms_px
-};
-UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
-                         const Calibration& calibration, double noise_px,
-                         const PairGraphOptions& options);
 
 }  // namespace camgyro
 

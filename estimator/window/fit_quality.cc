@@ -1,0 +1,50 @@
+#include "estimator/window/fit_quality.h"
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+
+#include "core/parallel.h"
+#include "estimator/window/residuals/pair_residual.h"
+#include "factors/robust.h"
+
+namespace camgyro {
+
+void FitSum::Add(const std::vector<double>& residuals, double factor) {
+  for (size_t i = 0; i < residuals.size(); i += static_cast<size_t>(per_match_)) {
+    const double length = Eigen::Map<const Eigen::VectorXd>(&residuals[i], per_match_).norm();
+    const double bounded = Robustify(length, options_.robust_threshold).value;
+    sum_sq_ += factor * factor * bounded * bounded;
+    inliers_ += length <= options_.inlier_sigmas() ? 1 : 0;
+    ++matches_;
+  }
+}
+
+double FitSum::rms() const { return std::sqrt(sum_sq_ / std::max(1, per_match_ * matches_)); }
+
+UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+                         const Calibration& calibration, double noise_px,
+                         const PairGraphOptions& options) {
+  UnseenFit fit;
+  FitSum sum(options, options.residual->facts().per_match);
+  std::vector<std::optional<std::vector<double>>> of_pairs(pairs.size());
+  ParallelFor(pairs.size(), [&](size_t i) {
+    std::vector<double> residuals;
+    if (ResidualOf(pairs[i], options)
+            .Unseen(input, pairs[i], calibration, noise_px, options, &residuals)) {
+      of_pairs[i] = std::move(residuals);
+    }
+  });
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    if (!of_pairs[i]) continue;
+    ++fit.pairs;
+    sum.Add(*of_pairs[i], pairs[i].noise_factor);
+  }
+  fit.matches = sum.matches();
+  fit.rms_px = noise_px * sum.rms();
+  return fit;
+}
+
+}  // namespace camgyro

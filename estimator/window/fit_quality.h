@@ -1,0 +1,58 @@
+// How well matches fit: in a fit, and where it has not seen them.
+#ifndef CAMGYRO_ESTIMATOR_WINDOW_FIT_QUALITY_H_
+#define CAMGYRO_ESTIMATOR_WINDOW_FIT_QUALITY_H_
+
+#include <algorithm>
+#include <vector>
+
+#include "core/calibration.h"
+#include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_graph_options.h"
+
+namespace camgyro {
+
+struct FitQuality {
+  int pairs = 0;              // used
+  int matches = 0;            // in them
+  double inlier_ratio = 0.0;  // share of matches within PairGraphOptions::inlier_sigmas
+  double noise_px = 0.0;      // robust standard deviation per axis (attitudes: rad)
+  // How that scatters from pair to pair: rms of the logarithms of the pairs' factors.
+  double noise_scatter = 0.0;
+  double rms_px = 0.0;  // of residuals, each bounded by the loss
+};
+
+// How well matches fit, pair by pair.
+class FitSum {
+ public:
+  // per_match: residuals. The options must outlive it.
+  FitSum(const PairGraphOptions& options, int per_match)
+      : options_(options), per_match_(per_match) {}
+  // Independent residuals of a pair, in sigmas, without loss. factor: of its noise.
+  void Add(const std::vector<double>& residuals, double factor);
+  int matches() const { return matches_; }
+  // Per residual, in sigmas of a pair whose factor is 1.
+  double rms() const;
+  double inlier_ratio() const { return static_cast<double>(inliers_) / std::max(1, matches_); }
+
+ private:
+  const PairGraphOptions& options_;
+  const int per_match_;
+  double sum_sq_ = 0.0;
+  int inliers_ = 0, matches_ = 0;
+};
+
+// Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
+// direction of each pair (and its frames' own times, if they have any) from every other match,
+// residuals from the rest. A transfer has no direction: residuals from all matches.
+struct UnseenFit {
+  int pairs = 0;
+  int matches = 0;
+  double rms_px = 0.0;  // bounded by the loss, as FitQuality::rms_px
+};
+UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
+                         const Calibration& calibration, double noise_px,
+                         const PairGraphOptions& options);
+
+}  // namespace camgyro
+
+#endif  // CAMGYRO_ESTIMATOR_WINDOW_FIT_QUALITY_H_

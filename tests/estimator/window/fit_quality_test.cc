@@ -1,0 +1,68 @@
+#include "estimator/window/fit_quality.h"
+
+#include <gtest/gtest.h>
+
+#include "estimator/window/residuals/all_residuals.h"
+#include "tests/estimator/simulated_input.h"
+
+namespace camgyro {
+namespace {
+
+using simulation::Simulated;
+using simulation::SimulateTracks;
+
+TEST(FitSum, BoundsWhatIsWrong) {
+  PairGraphOptions options;
+  FitSum sum(options, /*per_match=*/2);
+  EXPECT_EQ(sum.rms(), 0.0);
+  EXPECT_EQ(sum.inlier_ratio(), 0.0);
+  sum.Add({0.6, 0.8, 300.0, 400.0}, 1.0);
+  EXPECT_EQ(sum.matches(), 2);
+  EXPECT_EQ(sum.inlier_ratio(), 0.5);
+  const double with_wrong = sum.rms();
+  EXPECT_LT(with_wrong, 5.0);
+  // Of a pair that is twice as noisy, a sigma is twice as much.
+  FitSum noisy(options, 2);
+  noisy.Add({0.6, 0.8, 300.0, 400.0}, 2.0);
+  EXPECT_DOUBLE_EQ(noisy.rms(), 2.0 * with_wrong);
+}
+
+TEST(EvaluateUnseen, IsTheNoiseAtTheTruthAndMoreElsewhere) {
+  const Simulated s = SimulateTracks(ShortScenario(4.0)).value();
+  const EstimationInput input = MakeEstimationInput(s.recording);
+  const UnseenFit at_truth = EvaluateUnseen(input, input.pairs, s.truth, 0.7, {});
+  EXPECT_EQ(at_truth.pairs, 120);
+  EXPECT_GT(at_truth.matches, 120 * 15);
+  // The direction comes from the other half of the matches, so that its error adds some.
+  EXPECT_GT(at_truth.rms_px, 0.65);
+  EXPECT_LT(at_truth.rms_px, 0.90);
+  Calibration wrong = s.truth;
+  wrong.lens[kFocal] *= 1.1;
+  EXPECT_GT(EvaluateUnseen(input, input.pairs, wrong, 0.7, {}).rms_px, 1.1 * at_truth.rms_px);
+  wrong = s.truth;
+  wrong.delay_s += 0.02;
+  EXPECT_GT(EvaluateUnseen(input, input.pairs, wrong, 0.7, {}).rms_px, 1.2 * at_truth.rms_px);
+  // Pairs outside of the gyro's time are not counted.
+  EstimationInput late = input;
+  late.rates.erase(late.rates.begin(), late.rates.begin() + 500);  // 2.5 s, of which 0.5 before
+  EXPECT_NEAR(EvaluateUnseen(late, input.pairs, s.truth, 0.7, {}).pairs, 60, 2);
+}
+
+TEST(EvaluateUnseen, OfTransfersIsTheNoiseAtTheTruthAndMoreElsewhere) {
+  const Simulated s = SimulateTracks(FarScenario(4.0)).value();
+  const EstimationInput input = MakeEstimationInput(s.recording);
+  size_t matches = 0;
+  for (const TimedPair& pair : input.pairs) matches += pair.matches.size();
+  PairGraphOptions options;
+  options.residual = &ByTransfer();
+  const UnseenFit at_truth = EvaluateUnseen(input, input.pairs, s.truth, 0.7, options);
+  EXPECT_EQ(at_truth.pairs, 120);
+  EXPECT_EQ(at_truth.matches, static_cast<int>(matches));
+  EXPECT_NEAR(at_truth.rms_px, 0.7, 0.03);
+  Calibration wrong = s.truth;
+  wrong.lens[kFocal] *= 1.1;
+  EXPECT_GT(EvaluateUnseen(input, input.pairs, wrong, 0.7, options).rms_px, 1.3 * at_truth.rms_px);
+}
+
+}  // namespace
+}  // namespace camgyro
