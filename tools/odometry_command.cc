@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "core/format.h"
+#include "core/free_memory.h"
 #include "estimator/odometry/follow_recording.h"
 #include "estimator/odometry/gyro_rate_trajectory.h"
 #include "pipeline/find_loops.h"
@@ -181,6 +182,9 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
   if (!loops) return tl::unexpected(loops.error());
+  // No file needs them: of an hour, they are half a gigabyte, and so are the texts of the poses.
+  recording->tracks = {};
+  GiveBackFreeMemory();
 
   const std::string yaml = OdometryYaml(*run, *loops);
   files.Add("odometry.yaml", yaml);
