@@ -288,7 +288,7 @@ class Loop {
     const double noise = fit_.quality.noise_px;
     Tell(round, 0.1);
     EffectSetup setup = MakeEffectSetup(*in_.recording, fit_.calibration);
-    // Before the candidates: of an hour, the scores of either are 50 MB and more.
+    // Before the candidates, whose scores of an hour need not be beside those of the maps, 125 MB.
     last_maps_ = Maps(setup);
     Tell(round, 0.2);
     const RoundScores scores = Score(std::move(setup));
