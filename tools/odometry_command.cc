@@ -182,7 +182,7 @@ Status RunOdometry(const std::vector<std::string>& arguments) {
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
   if (!loops) return tl::unexpected(loops.error());
-  // No file needs them: of an hour, they are half a gigabyte, and so are the texts of the poses.
+  // No file needs them: of an hour of 150 tracks, they are half a gigabyte.
   recording->tracks = {};
   GiveBackFreeMemory();
 

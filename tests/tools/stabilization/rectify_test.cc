@@ -77,6 +77,7 @@ TEST(Rectify, DropsWhatLeavesThePictureOrTheGyrosTime) {
   EXPECT_GT(rectified->first_frame, 3);
   EXPECT_EQ(rectified->frames_dropped, rectified->first_frame);
   EXPECT_EQ(rectified->recording.tracks.size(), rectified->recording.frames.size());
+  EXPECT_TRUE(s.recording.tracks.empty());  // they were taken, not copied
   EXPECT_EQ(rectified->recording.frames.size() + static_cast<size_t>(rectified->frames_dropped),
             frames);
   for (const auto& frame : rectified->recording.tracks) {
