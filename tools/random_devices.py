@@ -4,14 +4,15 @@ class usually show and declared by nobody, and prints how the errors compare wit
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
                             [--motions NAME,...] [--clean] [--strange] [--rendered] [--diagnose]
-                            [--jobs N] [--camgyro PATH] [KEY=VALUE ...]
+                            [--stream PREPARE_VIO] [--jobs N] [--camgyro PATH] [KEY=VALUE ...]
 
 The sizes are those of the class in estimator/diagnosis/device_class.cc, read from that file. --clean
 draws nothing: for how often a doubt is said of a device that has no effect. --strange also draws how
 each was recorded: motion, length, rates, size of the picture, mounting, stamps of arrival, samples and
 frames that are missing, wrong, few and short-lived tracks, and things that move. --rendered: video of
 a scene, light and compression that are drawn instead of tracks. --diagnose: what `diagnose` makes
-of the devices, instead of `calibrate`. KEY=VALUE changes the scenario of all recordings, as in
+of the devices, instead of `calibrate`. --stream: what the library's Calibrator makes of them, frame by
+frame, with that program (examples/recording); of phones only. KEY=VALUE changes the scenario of all recordings, as in
 `camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the errors within 3
 sigma_total, their rms in sigma_total, the median of sigma_total [px, s, rad/s, rad] and what that is
 of the spread of the errors, the recordings with errors beyond 3 sigma_total (or, with --clean, beyond
@@ -187,10 +188,12 @@ def run(options, seed):
             yaml.safe_dump(scenario, file)
         subprocess.run([options.camgyro, "simulate", folder + "/scenario.yaml", *options.changes,
                         "--out", recording], check=True, stdout=subprocess.DEVNULL)
-        command = "diagnose" if options.diagnose else "calibrate"
-        done = subprocess.run([options.camgyro, command, recording, "--out", out,
-                               "--device", options.device],
-                              capture_output=True, text=True, check=False)
+        if options.stream:
+            command = [options.stream, recording, out]
+        else:
+            command = [options.camgyro, "diagnose" if options.diagnose else "calibrate", recording,
+                       "--out", out, "--device", options.device]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         if not os.path.exists(out + "/calibration.yaml"):
             print(seed, motion, "refused:", done.stderr.strip().split("\n")[-1], flush=True)
             return None
@@ -201,7 +204,7 @@ def run(options, seed):
         doubts = ["the pictures show something" in done.stdout,
                   "the two halves of the recording disagree" in done.stdout]
         if not options.clean:
-            as_fitted(truth, calibration, recording, scenario["duration_s"])
+            as_fitted(truth, calibration, recording, scenario["duration_s"], bool(options.stream))
         truth["clock"]["delay_s"]["value"] += latency_s(scenario)
         error, noise = errors(calibration, truth)
         total = np.array(calibration["covariance"]["total"])
@@ -211,20 +214,27 @@ def run(options, seed):
                     name="%s %d" % (motion, seed))
 
 
-def as_fitted(truth, calibration, recording, duration_s):
+def as_fitted(truth, calibration, recording, duration_s, at_end):
     """What the effects shift by definition (docs/effects.md): a filter delays the gyro by its time
     constant, a drifting bias is that of the middle, under the mean force; where a gyro's clock was
-    laid behind stamps of arrival and its rate is fitted, so is the delay."""
+    laid behind stamps of arrival and its rate is fitted, so is the delay. at_end: delay and bias are
+    those of the last frame, as the library follows them."""
     values = {e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
               for e in truth["effects"]}
     truth["clock"]["delay_s"]["value"] += values["gyro_lowpass"]["time_constant"]
-    if any(e["name"] == "clock_skew" and str(e["shape"]).isdigit() for e in calibration["effects"]):
-        skew = 1e-6 * values["clock_skew"]["skew"]
-        truth["clock"]["delay_s"]["value"] += skew * (0.5 * duration_s + 0.5)
+    passed_s = 0.5 + duration_s * (1.0 if at_end else 0.5)
+    if at_end or any(e["name"] == "clock_skew" and str(e["shape"]).isdigit()
+                     for e in calibration["effects"]):
+        truth["clock"]["delay_s"]["value"] += 1e-6 * values["clock_skew"]["skew"] * passed_s
+    if at_end:  # as in simulation/effects/delay_wander.h
+        wander = values["delay_wander"]
+        turn = 2 * np.pi * duration_s / wander["period"]
+        truth["clock"]["delay_s"]["value"] += wander["amplitude"] * float(
+            0.7 * np.sin(turn) + 0.3 * np.sin(1.618 * turn + 1))
     force = np.loadtxt(recording + "/imu0/data.csv", delimiter=",")[:, 4:7].mean(axis=0)
     bias = truth["gyro"]["bias_rad_s"]
     bias["value"] = [
-        b + values["bias_drift"]["rate_" + axis] * (0.5 * duration_s + 0.5)
+        b + values["bias_drift"]["rate_" + axis] * passed_s
         + values["gyro_g_sensitivity"][axis] * f
         for axis, b, f in zip("xyz", bias["value"], force)]
 
@@ -246,10 +256,13 @@ def main():
     parser.add_argument("--strange", action="store_true")
     parser.add_argument("--rendered", action="store_true")
     parser.add_argument("--diagnose", action="store_true")
+    parser.add_argument("--stream", metavar="PREPARE_VIO")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
     parser.add_argument("changes", nargs="*", metavar="KEY=VALUE")
     options = parser.parse_args()
+    if options.stream and (options.diagnose or options.device != "phone"):
+        parser.error("--stream: of phones, without --diagnose")
     options.motions = options.motions.split(",")
     first, last = (options.seeds.split("-") * 2)[:2]
     seeds = range(int(first), int(last) + 1)

@@ -7,6 +7,7 @@
 // - readiness.csv has each parameter with its sigma, and whether it is good enough.
 #include <camgyro/calibrator.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -22,6 +23,34 @@ namespace {
 
 std::int64_t OnGyroClock(std::int64_t stamp_ns, const Calibration& c, double row_fraction) {
   return stamp_ns + std::llround(1e9 * (c.delay_s + row_fraction * c.readout_s));
+}
+
+// As in calibration.yaml, in the order of the library's parameters.
+constexpr std::array<const char*, kParameters> kNames = {
+    "focal_px", "cx_px",  "cy_px", "readout_s", "delay_s", "bias_x",
+    "bias_y",   "bias_z", "q_x",   "q_y",       "q_z"};
+
+void WriteMatrix(const char* key, const std::array<double, kParameters * kParameters>& matrix,
+                 std::ostream& out) {
+  out << "  " << key << ":\n";
+  for (int i = 0; i < kParameters; ++i) {
+    for (int j = 0; j < kParameters; ++j) {
+      out << (j == 0 ? "    - [" : ", ") << matrix[i * kParameters + j];
+    }
+    out << "]\n";
+  }
+}
+
+// What the motion did not determine is what was assumed beforehand.
+void WriteUndetermined(const Snapshot& snapshot, std::ostream& out) {
+  const char* separator = "";
+  out << "quality: {unobservable: [";
+  for (int i = 0; i < kParameters; ++i) {
+    if (snapshot.parameters[i].readiness != Readiness::kUndetermined) continue;
+    out << separator << kNames[i];
+    separator = ", ";
+  }
+  out << "]}\n";
 }
 
 void WriteCalibration(const Snapshot& snapshot, std::ostream& out) {
@@ -48,6 +77,13 @@ void WriteCalibration(const Snapshot& snapshot, std::ostream& out) {
       << "extrinsics: {q_gyro_cam_wxyz: {value: [" << q[0] << ", " << q[1] << ", " << q[2] << ", "
       << q[3] << "], sigma_rad: [" << p[kRotationX].sigma << ", " << p[kRotationY].sigma << ", "
       << p[kRotationZ].sigma << "]}}\n";
+  out << "covariance:\n  order: [";
+  for (int i = 0; i < kParameters; ++i) out << (i == 0 ? "" : ", ") << kNames[i];
+  out << "]\n";
+  WriteMatrix("matrix", c.covariance, out);
+  // Infinite before the library has looked for undeclared effects.
+  if (std::isfinite(c.total_covariance[0])) WriteMatrix("total", c.total_covariance, out);
+  WriteUndetermined(snapshot, out);
 }
 
 }  // namespace
@@ -100,6 +136,7 @@ int main(int argc, char** argv) {
     std::cerr << folder << ": cannot be written\n";
     return 3;
   }
+  if (!snapshot->doubt.empty()) std::cout << "doubt: " << snapshot->doubt << "\n";
   std::cout << (snapshot->ready ? "ready" : "not all parameters are ready: see readiness.csv")
             << "\n";
   return 0;
