@@ -52,7 +52,7 @@ void TotalError::Renew(const VinsInput& latest, MatchNoise noise,
   report.prior = {calibration, progress.prior_sigma};
   report.start.delay_middle_row_s = report.calibration.delay_s + 0.5 * report.calibration.readout_s;
   report.quality.noise_px = progress.noise_px;
-  doubt_ = CheckModel(recording, {}, device_, &report).value_or("");
+  doubt_ = CheckModel(recording, {}, device_, &report, FittedTo::kMoreData).value_or("");
   const auto& total = report.calibration.total_covariance;
   if (total && total->allFinite()) added_ = *total - report.calibration.covariance;
 }

@@ -104,7 +104,8 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
 struct Usual {
   std::vector<int> columns;
   Eigen::VectorXd prior, sigma;  // information of all columns; usual sizes of `columns`
-  Eigen::MatrixXd C;             // mean square of the effects, given the residuals
+  Eigen::VectorXd c_hat;         // the effects, given the residuals
+  Eigen::MatrixXd C;             // their mean square
   Eigen::MatrixXd X;             // state x columns
 };
 
@@ -132,9 +133,9 @@ Usual UsualGiven(const Tested& t, double inflation) {
       u.sigma.asDiagonal() * p.information * u.sigma.asDiagonal() / inflation;
   information.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> solver(information);
-  const Eigen::VectorXd c_hat = -solver.solve(u.sigma.cwiseProduct(p.score) / inflation);
+  u.c_hat = -solver.solve(u.sigma.cwiseProduct(p.score) / inflation);
   u.C = solver.solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())) +
-        c_hat * c_hat.transpose();
+        u.c_hat * u.c_hat.transpose();
   u.X = p.shift.topRows<kStateSize>() * u.sigma.asDiagonal();
   return u;
 }
@@ -183,9 +184,25 @@ bool HidesTurns(const Tested& t, const Calibration& c) {
   return t.unseen_parallax_rad_s > kUnseenSaid * c.sigma().segment<3>(kStateBias).maxCoeff();
 }
 
-void AddTotal(const Tested& t, const Usual& u, CalibrationReport* report) {
+// From the calibration to the fit of these data alone, as far as that is more than their noise
+// makes: the positive part of James and Stein's estimator of the mean of a Gaussian vector, whose
+// inverse covariance is the information of the data.
+StateVector StepToOwnFit(const Tested& t, double inflation) {
+  const Eigen::VectorXd step = StepOf(t.scores, {}, t.prior);
+  double chi2 = 0.0;
+  for (const BlockScore& block : t.scores.blocks) chi2 -= block.g.dot(step) / inflation;
+  const double noise = static_cast<double>(t.scores.num_model);
+  return std::max(0.0, 1.0 - noise / std::max(noise, chi2)) * step.head<kStateSize>();
+}
+
+// own_fit: from the calibration to where a fit of these data is.
+void AddTotal(const Tested& t, const Usual& u, const StateVector& own_fit,
+              CalibrationReport* report) {
   Calibration& c = report->calibration;
-  c.total_covariance = StateCovariance(c.covariance + u.X * u.C * u.X.transpose());
+  const StateVector by_effects = u.X * u.c_hat;
+  const StateVector off = by_effects - own_fit;
+  c.total_covariance = StateCovariance(c.covariance + u.X * u.C * u.X.transpose() +
+                                       off * off.transpose() - by_effects * by_effects.transpose());
   Eigen::Index at = 0;
   for (const UsualColumns& effect : t.usual) {
     const auto n = static_cast<Eigen::Index>(effect.columns.size());
@@ -263,7 +280,8 @@ std::optional<std::string> Suspect(const Tested& t, const Calibration& model,
 }  // namespace
 
 std::optional<std::string> CheckModel(const Recording& recording, const CalibrateOptions& options,
-                                      DeviceClass device, CalibrationReport* report) {
+                                      DeviceClass device, CalibrationReport* report,
+                                      FittedTo fitted_to) {
   if (!report->residual->facts().with_effects) return std::nullopt;
   if (!(report->quality.noise_px > 0.0)) return std::nullopt;
   const Tested t = Score(recording, options, device, *report);
@@ -274,10 +292,13 @@ std::optional<std::string> CheckModel(const Recording& recording, const Calibrat
   }
   const Scatter usual = UsualScatter(alone);
   report->device_class = DeviceClassName(device);
-  const Usual effects = UsualGiven(t, std::max(1.0, usual.variance));
+  const double inflation = std::max(1.0, usual.variance);
+  const Usual effects = UsualGiven(t, inflation);
   if (!effects.columns.empty()) {
     if (Scatters(t)) ExplainHalves(t, effects, report);
-    AddTotal(t, effects, report);
+    const bool fitted = fitted_to == FittedTo::kTheseData;
+    AddTotal(t, effects, fitted ? StateVector(StateVector::Zero()) : StepToOwnFit(t, inflation),
+             report);
   }
   return Suspect(t, report->calibration, alone, usual);
 }

@@ -12,6 +12,9 @@
 
 namespace camgyro {
 
+// What a calibration was fitted to.
+enum class FittedTo { kTheseData, kMoreData };
+
 // Fills total_covariance, device_class and systematic of the report. Returns a doubt in words where
 // a candidate of the catalogue is significant beyond doubt (kNoDoubt, all candidates together).
 //
@@ -22,6 +25,10 @@ namespace camgyro {
 //   total = covariance + X C X' + (X c_hat)(X c_hat)'.
 // The last term stands because the values are not corrected by X c_hat: a correction by an effect
 // that may be another one is left to the diagnosis, which tests it on unseen frames.
+//
+// A calibration that was fitted to more than these data, as an online estimate of which the last
+// seconds are here, is not where their fit is. It is off by X c_hat - d then, d being the step to
+// their fit, as far as that is more than noise.
 //
 // To that the gyro's bias has what parallax may hide of it (unseen_parallax.h).
 //
@@ -34,7 +41,8 @@ namespace camgyro {
 // residuals are taken for as noisy as the fit says, and no doubt. Nothing is filled for one that is
 // fitted with the residual of the transfer alone.
 std::optional<std::string> CheckModel(const Recording& recording, const CalibrateOptions& options,
-                                      DeviceClass device, CalibrationReport* report);
+                                      DeviceClass device, CalibrationReport* report,
+                                      FittedTo fitted_to = FittedTo::kTheseData);
 
 }  // namespace camgyro
 

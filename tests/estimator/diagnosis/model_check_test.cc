@@ -92,6 +92,30 @@ TEST(ModelCheck, TheTotalCoversAScaleThatNobodyDeclared) {
   EXPECT_LT(in_totals.cwiseAbs().maxCoeff(), 3.0) << in_totals.transpose();
 }
 
+// An online estimate is judged by its last seconds alone. Where their fit is elsewhere, by more
+// than their noise, it may be off by as much.
+TEST(ModelCheck, TheTotalCoversTheWayToTheFitOfTheData) {
+  const Calibrated c = Check({}, DeviceClass::kPhone);
+  const StateVector fitted = *c.report.calibration.sigma_total();
+  const auto total_of = [&](double away_s, FittedTo fitted_to) {
+    CalibrationReport online = c.report;
+    online.systematic.clear();
+    online.calibration.delay_s += away_s;
+    CheckModel(c.simulated.recording, {}, DeviceClass::kPhone, &online, fitted_to);
+    return *online.calibration.sigma_total();
+  };
+  // At the fit, and off it by what is noise: as if it were that of these data.
+  const double noise_s = c.report.calibration.sigma()[kStateDelay];
+  EXPECT_TRUE(total_of(0.0, FittedTo::kMoreData).isApprox(fitted, 1e-2));
+  EXPECT_TRUE(total_of(noise_s, FittedTo::kMoreData).isApprox(fitted, 1e-2));
+  const double away_s = 5.0 * fitted[kStateDelay];
+  const StateVector off = total_of(away_s, FittedTo::kMoreData);
+  EXPECT_GT(off[kStateDelay], 0.8 * away_s);
+  EXPECT_LT(off[kStateDelay], 1.2 * std::hypot(away_s, fitted[kStateDelay]));
+  EXPECT_LT(off[kStateFocal], 1.1 * fitted[kStateFocal]);
+  EXPECT_LT(total_of(away_s, FittedTo::kTheseData)[kStateDelay], 0.5 * away_s);
+}
+
 // Too short for stretches that scatter: what effects may add is there all the same.
 TEST(ModelCheck, AShortRecordingHasATotalAndNoDoubt) {
   const Calibrated c =
