@@ -118,14 +118,16 @@ Status OnlineCalibration::TryStart() {
       FindStartAndFocal(recording, RotationsFrom(recording, kMaxScanPairs), options, {});
   if (!start) return tl::unexpected(start.error());
 
-  gap_ = SelectPairs(recording, {kGapLimitsOnline.gap, /*least_pairs=*/10, kGapLimitsOnline.far_s})
-             .gap;
+  GapLimits limits = kGapLimitsOnline;
+  limits.least_pairs = 10;
+  const PairSelection selection = SelectPairs(recording, limits);
+  gap_ = selection.gap;
 
   const Result<StartingPoint> point =
       MakeStartingPoint(recording, *start, /*effects=*/"clock_skew", ByPlane());
   if (!point) return tl::unexpected(point.error());
   progress_.prior_sigma = point->prior.sigma;
-  SlidingWindowOptions window_options;
+  SlidingWindowOptions window_options = WindowOptionsFor(selection);
   window_options.graph = GraphOptionsFor(recording, *start, window_options.graph);
   window_options.skew_walk_rtHz = kSkewWalk_rtHz;
   window_.emplace(point->estimate, point->prior, gyro_.front().stamp_ns, window_options);

@@ -11,8 +11,9 @@ OnlinePass::OnlinePass(const Recording& recording, const EstimationInput& input,
     : recording_(recording),
       input_(input),
       start_(start),
-      pairs_(SideBySide(OutlineOf(recording, SelectPairs(recording, kGapLimitsOnline)).pairs)),
-      window_(start, prior, input.origin_ns, options) {
+      selection_(SelectPairs(recording, kGapLimitsOnline)),
+      pairs_(SideBySide(OutlineOf(recording, selection_).pairs)),
+      window_(start, prior, input.origin_ns, WindowOptionsFor(selection_, options)) {
   window_.SetListener([this](const WindowUpdate& update) { trace_.push_back(update); });
 }
 

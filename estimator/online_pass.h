@@ -12,6 +12,7 @@
 #include "core/result.h"
 #include "estimator/calibrate.h"
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_selection.h"
 #include "estimator/window/sliding_window.h"
 
 namespace camgyro {
@@ -50,6 +51,7 @@ class OnlinePass {
   const Recording& recording_;
   const EstimationInput& input_;
   const Calibration start_;
+  const PairSelection selection_;
   const std::vector<TimedPair> pairs_;
   SlidingWindow window_;
   std::vector<WindowUpdate> trace_;

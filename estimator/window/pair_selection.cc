@@ -130,7 +130,15 @@ PairSelection SelectPairs(const Recording& recording, const GapLimits& limits) {
   if (selection.gap < 3) return selection;
   const double parallax = ParallaxPerFrame(recording, selection.gap);
   gap = selection.gap;
-  while (gap * parallax < kLeastParallax && take(gap + 2, limits.far_s)) gap += 2;
+  const bool far = gap * parallax < kLeastParallax;
+  if (far) {
+    const int farthest = std::min(limits.gap, static_cast<int>(limits.far_s / interval_s));
+    const bool turns = limits.turn_s < limits.far_s && farthest > gap &&
+                       farthest * ParallaxPerFrame(recording, farthest) < kLeastFarParallax;
+    const double longest_s = turns ? limits.turn_s : limits.far_s;
+    while (gap * parallax < kLeastParallax && take(gap + 2, longest_s)) gap += 2;
+  }
+  selection.far = far;
   return selection;
 }
 

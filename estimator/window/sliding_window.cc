@@ -29,6 +29,14 @@ PairGraphOptions Keeping(PairGraphOptions options) {
 
 }  // namespace
 
+SlidingWindowOptions WindowOptionsFor(const PairSelection& selection,
+                                      SlidingWindowOptions options) {
+  if (!selection.far) return options;
+  options.window_pairs = options.unsettled_pairs;
+  options.unsettled_stride = options.undetermined_stride = 2;
+  return options;
+}
+
 SlidingWindow::SlidingWindow(const Calibration& start, const Prior& prior, int64_t origin_ns,
                              const SlidingWindowOptions& options)
     : options_(options),

@@ -14,6 +14,7 @@
 #include "core/result.h"
 #include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
+#include "estimator/window/pair_selection.h"
 #include "estimator/window/track_lean.h"
 
 namespace camgyro {
@@ -42,6 +43,11 @@ struct SlidingWindowOptions {
   // model: the delay is then that of the newest frame. 0: nothing is forgotten.
   double skew_walk_rtHz = 0.0;
 };
+
+// For pairs as they were selected. Pairs of far things say little of their directions, which are
+// right beside many others only, so that ten times as many stay; few of them come in a second.
+SlidingWindowOptions WindowOptionsFor(const PairSelection& selection,
+                                      SlidingWindowOptions options = {});
 
 enum class AddResult {
   kAccepted,

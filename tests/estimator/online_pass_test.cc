@@ -61,5 +61,43 @@ TEST(OnlinePass, GoesToTheEndWithoutSettling) {
   EXPECT_EQ(pass.window().num_used_pairs(), all.window().num_used_pairs());
 }
 
+// Somebody walks past things that are 50 to 150 m away. In a window of few pairs, and short ones, a
+// step sideways passes for a turn.
+TEST(OnlinePass, LeavesNoParallaxToPassForATurn) {
+  double errors[2] = {0.0, 0.0};  // of the bias about x: of few pairs, of the pass [rad/s]
+  for (const uint64_t seed : {1, 2}) {
+    simulation::Scenario scenario = ShortScenario(20.0);
+    scenario.seed = seed;
+    scenario.motion = simulation::MotionPreset(simulation::MotionKind::kHandheld);
+    scenario.scene.depth_law = simulation::DepthLaw::kUniform;
+    scenario.scene.depth_m = {50.0, 150.0};
+    scenario.tracks.noise_px = 0.5;
+    const Passes passes(scenario);
+    const PairSelection selection = SelectPairs(passes.s.recording, kGapLimitsOnline);
+    ASSERT_TRUE(selection.far);
+    OnlinePass pass = passes.Make();
+    ASSERT_TRUE(pass.Finish());
+    // What a pass was before: pairs of a third of a second, six of them.
+    SlidingWindow few(passes.start.mean, passes.start, passes.input.origin_ns, {});
+    const EstimationInput input = MakeEstimationInput(passes.s.recording, {9, 10});
+    for (const GyroSample& sample : passes.s.recording.gyro) {
+      ASSERT_EQ(few.AddGyroSample(sample), AddResult::kAccepted);
+    }
+    for (const TimedPair& pair : SideBySide(input.pairs)) {
+      ASSERT_EQ(few.AddPair(passes.s.recording.frames[static_cast<size_t>(pair.frame_a)].stamp_ns,
+                            passes.s.recording.frames[static_cast<size_t>(pair.frame_b)].stamp_ns,
+                            pair.matches),
+                AddResult::kAccepted);
+    }
+    const SlidingWindow* windows[2] = {&few, &pass.window()};
+    for (int i = 0; i < 2; ++i) {
+      const Calibration& estimate = windows[i]->latest().estimate;
+      errors[i] += std::abs((estimate.bias_gyro_rad_s - passes.s.truth.bias_gyro_rad_s).x()) / 2.0;
+    }
+  }
+  EXPECT_GT(errors[0], 1e-3);
+  EXPECT_LT(errors[1], 0.4 * errors[0]);
+}
+
 }  // namespace
 }  // namespace camgyro

@@ -49,9 +49,8 @@ PairGraphOptions WithNoiseOf(const Input& input, PairGraphOptions options) {
 
 // Pairs and samples in the order of real time, as CalibrateRecording feeds them.
 std::vector<WindowUpdate> RunWindow(const Input& input, const EstimationInput& data,
-                                    const PairGraphOptions& graph) {
+                                    SlidingWindowOptions options, const PairGraphOptions& graph) {
   std::vector<WindowUpdate> trace;
-  SlidingWindowOptions options;
   options.graph = graph;
   SlidingWindow window(input.start, input.prior, data.origin_ns, options);
   window.SetListener([&](const WindowUpdate& update) { trace.push_back(update); });
@@ -148,9 +147,10 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
   const auto run_window = [&] {
     if (window) return;
     window.emplace();
-    const EstimationInput short_pairs =
-        MakeEstimationInput(input.recording, SelectPairs(input.recording, kGapLimitsOnline));
-    Measure([&] { window_trace = RunWindow(input, short_pairs, fit); }, &*window);
+    const PairSelection selection = SelectPairs(input.recording, kGapLimitsOnline);
+    const EstimationInput pairs = MakeEstimationInput(input.recording, selection);
+    const SlidingWindowOptions options = WindowOptionsFor(selection);
+    Measure([&] { window_trace = RunWindow(input, pairs, options, fit); }, &*window);
     TakeTrace(window_trace, input, &*window);
   };
   for (const std::string& name : names) {

@@ -63,6 +63,7 @@ TEST(SelectPairs, TakesLongerGapsWhereThingsAreFar) {
                   equal = SimulateTracks(WithDepths(45.0, 55.0))->recording;
   const int usual = SelectPairs(near).gap;
   EXPECT_LE(usual, 6);  // 0.2 s at 30 frames/s
+  EXPECT_FALSE(SelectPairs(near).far);
   EXPECT_GE(usual * ParallaxPerFrame(near, usual), kLeastParallax);
   EXPECT_LT(usual * ParallaxPerFrame(far, usual), 0.5 * kLeastParallax);
   for (const Recording* recording : {&far, &equal}) {
@@ -71,9 +72,26 @@ TEST(SelectPairs, TakesLongerGapsWhereThingsAreFar) {
     EXPECT_LE(selection.gap, 24);  // 0.8 s
     EXPECT_EQ(selection.gap % 2, 1);
     EXPECT_EQ(selection.stride, 2);
-    EXPECT_EQ(SelectPairs(*recording, kGapLimitsOnline).gap, 9);  // 0.3 s
-    EXPECT_LE(SelectPairs(*recording, {/*gap=*/7}).gap, 7);
+    EXPECT_TRUE(selection.far);
+    const PairSelection limited = SelectPairs(*recording, {/*gap=*/7});
+    EXPECT_LE(limited.gap, 7);
+    EXPECT_TRUE(limited.far);
   }
+}
+
+// Where nothing has parallax, longer pairs find none: those of estimators that go along stay short.
+TEST(SelectPairs, KnowsACameraThatOnlyTurns) {
+  const Recording far = SimulateTracks(WithDepths(45.0, 55.0))->recording;
+  Scenario scenario = WithDepths(1.5, 20.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRotation);
+  const Recording turning = SimulateTracks(scenario)->recording;
+  EXPECT_GT(24 * ParallaxPerFrame(far, 24), 1.2 * kLeastFarParallax);
+  EXPECT_LT(24 * ParallaxPerFrame(turning, 24), 0.8 * kLeastFarParallax);
+  EXPECT_GT(SelectPairs(far, kGapLimitsOnline).gap, 9);
+  const PairSelection selection = SelectPairs(turning, kGapLimitsOnline);
+  EXPECT_EQ(selection.gap, 9);  // 0.3 s at 30 frames/s
+  EXPECT_TRUE(selection.far);
+  EXPECT_GT(SelectPairs(turning).gap, 9);
 }
 
 // Somebody walks past things that are 30 to 300 m away: in pairs of usual length their parallax
