@@ -137,11 +137,20 @@ class CalibrationJob {
   Status Window() {
     SlidingWindowOptions window_options = options_.window;
     window_options.graph = graph_options_;
-    online_.emplace(recording_, input_, estimate_, report_.prior, window_options);
-    if (const Status done = online_->RunUntilSettled(progress_); !done) return done;
-    if (online_->has_estimate()) {
-      estimate_ = online_->window().latest().estimate;
-      online_noise_ = online_->window().latest().noise_px;
+    const PairSelection selection = SelectPairs(recording_, kGapLimitsOnline);
+    const auto pass_of = [&](const PairSelection& of, std::optional<OnlinePass>* pass) {
+      pass->emplace(recording_, input_, of, estimate_, report_.prior, window_options);
+    };
+    pass_of(selection, &online_);
+    // From a poor start, as with a strong lens that nothing declares, a few short pairs find the
+    // way more often than many long ones.
+    std::optional<OnlinePass> short_pass;
+    if (selection.far) pass_of(SelectPairs(recording_, kGapLimitsOfPoorStart).near(), &short_pass);
+    OnlinePass& first = short_pass ? *short_pass : *online_;
+    if (const Status done = first.RunUntilSettled(progress_); !done) return done;
+    if (first.has_estimate()) {
+      estimate_ = first.window().latest().estimate;
+      online_noise_ = first.window().latest().noise_px;
     }
     clock_.Finish("window");
     return {};

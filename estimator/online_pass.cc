@@ -6,14 +6,13 @@
 namespace camgyro {
 
 OnlinePass::OnlinePass(const Recording& recording, const EstimationInput& input,
-                       const Calibration& start, const Prior& prior,
+                       const PairSelection& selection, const Calibration& start, const Prior& prior,
                        const SlidingWindowOptions& options)
     : recording_(recording),
       input_(input),
       start_(start),
-      selection_(SelectPairs(recording, kGapLimitsOnline)),
-      pairs_(SideBySide(OutlineOf(recording, selection_).pairs)),
-      window_(start, prior, input.origin_ns, WindowOptionsFor(selection_, options)) {
+      pairs_(SideBySide(OutlineOf(recording, selection).pairs)),
+      window_(start, prior, input.origin_ns, WindowOptionsFor(selection, options)) {
   window_.SetListener([this](const WindowUpdate& update) { trace_.push_back(update); });
 }
 

@@ -21,9 +21,11 @@ namespace camgyro {
 // frame at its stamp. The recording and its input outlive it.
 class OnlinePass {
  public:
-  // input: of the recording, an outline is enough. start: values with effects.
-  OnlinePass(const Recording& recording, const EstimationInput& input, const Calibration& start,
-             const Prior& prior, const SlidingWindowOptions& options);
+  // input: of the recording, an outline is enough. selection: of the pairs, those of input are not
+  // taken. start: values with effects.
+  OnlinePass(const Recording& recording, const EstimationInput& input,
+             const PairSelection& selection, const Calibration& start, const Prior& prior,
+             const SlidingWindowOptions& options);
   OnlinePass(const OnlinePass&) = delete;
   OnlinePass& operator=(const OnlinePass&) = delete;
 
@@ -51,7 +53,6 @@ class OnlinePass {
   const Recording& recording_;
   const EstimationInput& input_;
   const Calibration start_;
-  const PairSelection selection_;
   const std::vector<TimedPair> pairs_;
   SlidingWindow window_;
   std::vector<WindowUpdate> trace_;

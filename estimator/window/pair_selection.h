@@ -17,6 +17,8 @@ struct PairSelection {
   // Things are so far, or so equally far, that parallaxes differ by less than kLeastParallax where
   // nothing else limits the gap.
   bool far = false;
+  // The same pairs, as if of near things.
+  PairSelection near() const { return {gap, stride}; }
 
   // Odd gaps from every second frame have every frame; pairs one after the other have their ends.
   bool leaves_frames_out() const { return gap > 1 && stride == gap; }
@@ -37,6 +39,7 @@ struct GapLimits {
 // Of estimators that go along: pairs that do not overlap are few, if they are long, which costs a
 // camera that only turns more than it gains (docs/lab/pairs.md).
 constexpr GapLimits kGapLimitsOnline{std::numeric_limits<int>::max(), 100, 0.8, 0.3};
+constexpr GapLimits kGapLimitsOfPoorStart{std::numeric_limits<int>::max(), 100, 0.3, 0.3};
 
 // The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
 // observation does not, so that neighbours tell least, and are biased where their parallax is as

@@ -17,7 +17,8 @@ struct Passes {
         input(OutlineOf(s.recording, SelectPairs(s.recording))),
         start(StartOffTheTruth(s.truth)) {}
   OnlinePass Make() const {
-    return OnlinePass(s.recording, input, start.mean, start, SlidingWindowOptions());
+    return OnlinePass(s.recording, input, SelectPairs(s.recording, kGapLimitsOnline), start.mean,
+                      start, SlidingWindowOptions());
   }
 };
 
