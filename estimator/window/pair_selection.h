@@ -39,6 +39,8 @@ struct GapLimits {
 // Of estimators that go along: pairs that do not overlap are few, if they are long, which costs a
 // camera that only turns more than it gains (docs/lab/pairs.md).
 constexpr GapLimits kGapLimitsOnline{std::numeric_limits<int>::max(), 100, 0.8, 0.3};
+// From a start that may be poor, for PairSelection::near: long pairs more often lead elsewhere
+// (docs/lab/pairs.md, "Online").
 constexpr GapLimits kGapLimitsOfPoorStart{std::numeric_limits<int>::max(), 100, 0.3, 0.3};
 
 // The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
