@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/time.h"
+#include "estimator/astray.h"
+#include "estimator/calibrate.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/window/estimation_input.h"
 #include "frontend/stamp_clock.h"
@@ -27,6 +30,26 @@ constexpr double kStaleS = 5.0;  // frames without a solved window
 // Clocks of cameras that warm up change their rate by some 1 ppm in a second, those of flight
 // controllers, whose delay grows by 20 to 30 ms in a minute, by some 10 ppm.
 constexpr double kSkewWalk_rtHz = 20e-6;
+constexpr char kEffects[] = "clock_skew";
+
+// A fit of all that was collected, with the distortion of a lens that nothing declares where it
+// leads fits astray: a window without it runs to any focal length. Nothing where the fit leads
+// nowhere.
+std::optional<Calibration> FitCollected(const Recording& recording,
+                                        const CameraRotationsAt& rotations_at,
+                                        const StartResult& start, const Calibration& from) {
+  CalibrateOptions options;
+  options.effects = kEffects;
+  options.given_start = start;
+  options.times_between = false;
+  Result<CalibrationReport> fit = CalibrateRecording(recording, rotations_at, options);
+  if (!fit || !fit->converged) return std::nullopt;
+  const double focal_px = fit->calibration.lens[kFocal];
+  if (RanAway(focal_px, from.lens[kFocal]) || IsFarFromRotations(focal_px, fit->start.focal)) {
+    return std::nullopt;
+  }
+  return std::move(fit->calibration);
+}
 
 }  // namespace
 
@@ -114,8 +137,8 @@ Status OnlineCalibration::TryStart() {
   progress_.frame_stamps = stamps;
   StartOptions options;
   options.search_s = kSearchS;
-  const Result<StartResult> start =
-      FindStartAndFocal(recording, RotationsFrom(recording, kMaxScanPairs), options, {});
+  const CameraRotationsAt rotations_at = RotationsFrom(recording, kMaxScanPairs);
+  const Result<StartResult> start = FindStartAndFocal(recording, rotations_at, options, {});
   if (!start) return tl::unexpected(start.error());
 
   GapLimits limits = kGapLimitsOnline;
@@ -123,9 +146,11 @@ Status OnlineCalibration::TryStart() {
   const PairSelection selection = SelectPairs(recording, limits);
   gap_ = selection.gap;
 
-  const Result<StartingPoint> point =
-      MakeStartingPoint(recording, *start, /*effects=*/"clock_skew", ByPlane());
+  Result<StartingPoint> point = MakeStartingPoint(recording, *start, kEffects, ByPlane());
   if (!point) return tl::unexpected(point.error());
+  if (auto fit = FitCollected(recording, rotations_at, *start, point->estimate)) {
+    point->estimate = *std::move(fit);
+  }
   progress_.prior_sigma = point->prior.sigma;
   SlidingWindowOptions window_options = WindowOptionsFor(selection);
   window_options.graph = GraphOptionsFor(recording, *start, window_options.graph);

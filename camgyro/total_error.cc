@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "core/time.h"
 #include "estimator/calibrate.h"
@@ -10,6 +12,39 @@
 #include "estimator/window/estimation_input.h"
 
 namespace camgyro::api {
+namespace {
+
+using camgyro::EffectSet;
+
+// The effects of the estimate that are its lens; those of clocks are of a recording.
+std::vector<EffectSet::Item> LensOf(const camgyro::Calibration& estimate) {
+  std::vector<EffectSet::Item> of_lens;
+  if (estimate.effects == nullptr) return of_lens;
+  for (const EffectSet::Item& item : estimate.effects->items()) {
+    if (item.effect->is_constant_lens()) of_lens.push_back(item);
+  }
+  return of_lens;
+}
+
+std::string NamesOf(const camgyro::Calibration& estimate) {
+  std::string names = "clock_skew";
+  for (const EffectSet::Item& item : LensOf(estimate)) {
+    names += "," + item.entry->name + ":" + item.shape;
+  }
+  return names;
+}
+
+void TakeLens(const camgyro::Calibration& estimate, camgyro::Calibration* calibration) {
+  for (const EffectSet::Item& from : LensOf(estimate)) {
+    for (const EffectSet::Item& to : calibration->effects->items()) {
+      if (to.entry != from.entry) continue;
+      calibration->effect_values.segment(to.first, to.effect->size()) =
+          estimate.effect_values.segment(from.first, from.effect->size());
+    }
+  }
+}
+
+}  // namespace
 
 bool TotalError::Due(std::int64_t frame_stamp_ns) const {
   return !checked_ns_ || SecondsSince(*checked_ns_, frame_stamp_ns) >= kBetweenChecksS;
@@ -37,9 +72,10 @@ void TotalError::Renew(const VinsInput& latest, MatchNoise noise,
   calibration = *progress.estimate;
   calibration.effects = nullptr;
   report.start.clock_skew = progress.clock_skew;
-  const Status added =
-      AddStartEffects(recording, report.start, "clock_skew", ByPlane(), &calibration);
+  const Status added = AddStartEffects(recording, report.start, NamesOf(*progress.estimate),
+                                       ByPlane(), &calibration);
   if (!added) return;
+  TakeLens(*progress.estimate, &calibration);
   const FrameTime latest_frame{
       SecondsSince(recording.gyro.front().stamp_ns, progress.frame_stamp_ns),
       std::numeric_limits<double>::quiet_NaN()};

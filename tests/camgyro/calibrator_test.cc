@@ -20,6 +20,7 @@
 #include "simulation/render.h"
 #include "simulation/simulate.h"
 #include "tests/camgyro/feed_calibrator.h"
+#include "tests/estimator/simulated_input.h"
 
 namespace camgyro::api {
 namespace {
@@ -246,6 +247,20 @@ TEST(Calibrator, WhatNobodyDeclaredIsNotReadyAndDoubted) {
   EXPECT_LT(error_px, 3.0 * focal.sigma_total);
   EXPECT_EQ(focal.readiness, Readiness::kImprecise);
   EXPECT_FALSE(snapshot->ready);
+}
+
+// A lens that leads fits astray is taken in at the start, and in the total.
+TEST(Calibrator, TakesInALensThatNobodyDeclared) {
+  const Scenario scenario = RoomThroughALens();
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(600.0));
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  const Calibration& c = snapshot->calibration;
+  EXPECT_NEAR(c.distortion[0], -0.28, 0.03);
+  EXPECT_LT(Sigmas(c.focal_px, s.truth.lens[camgyro::kFocal], snapshot->parameters[kFocal]), 4.5);
 }
 
 TEST(Calibrator, WithoutMotionItSaysWhy) {
