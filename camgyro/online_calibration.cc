@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/format.h"
 #include "core/time.h"
 #include "estimator/astray.h"
 #include "estimator/calibrate.h"
@@ -102,7 +103,14 @@ void OnlineCalibration::Collect() {
     frames_.pop_front();
   }
   lacks_gyro_ = false;
-  if (FrameSpan() < start_s_ || newest_ns < next_start_ns_) return;
+  if (FrameSpan() < start_s_) {
+    if (progress_.starts == 0) {
+      progress_.message =
+          Format("collecting the first frames: %.1f of %.1f s", FrameSpan(), start_s_);
+    }
+    return;
+  }
+  if (newest_ns < next_start_ns_) return;
   lacks_gyro_ = GyroSpan() < 0.5 * FrameSpan();
   if (lacks_gyro_) {
     progress_.message = "there are frames, but hardly any gyro samples";

@@ -7,6 +7,7 @@
 // - readiness.csv has each parameter with its sigma, and whether it is good enough.
 #include <camgyro/calibrator.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -23,6 +24,16 @@ namespace {
 
 std::int64_t OnGyroClock(std::int64_t stamp_ns, const Calibration& c, double row_fraction) {
   return stamp_ns + std::llround(1e9 * (c.delay_s + row_fraction * c.readout_s));
+}
+
+// The share of a short recording that the first search for a start gets; a stream would wait
+// longer.
+constexpr double kMostOfIt = 0.8;
+
+double LengthOf(const camgyro::Recording& recording) {  // [s]
+  if (recording.frames.empty()) return 0.0;
+  return 1e-9 *
+         static_cast<double>(recording.frames.back().stamp_ns - recording.frames.front().stamp_ns);
 }
 
 // As in calibration.yaml, in the order of the library's parameters.
@@ -100,6 +111,7 @@ int main(int argc, char** argv) {
     std::cerr << error << "\n";
     return 3;
   }
+  options.start_s = std::clamp(kMostOfIt * LengthOf(*recording), 2.0, options.start_s);
   const auto calibrator = Calibrator::Create(options, &error);
   if (calibrator == nullptr) {
     std::cerr << error << "\n";

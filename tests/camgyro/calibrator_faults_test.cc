@@ -45,6 +45,14 @@ TEST(CalibratorFaults, GyroThatNeverComesIsNamed) {
   EXPECT_THAT(calibrator->snapshot()->message, testing::HasSubstr("gyro"));
 }
 
+TEST(CalibratorFaults, TooFewFramesSayHowManyMore) {
+  const Simulated s = simulation::SimulateTracks(LivelyScenario(4.0)).value();
+  const auto calibrator = Make(OptionsFor(LivelyScenario(4.0)));
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(60.0));
+  EXPECT_THAT(calibrator->snapshot()->message, testing::HasSubstr(" of 5.0 s"));
+}
+
 TEST(CalibratorFaults, LateFramesAreNamed) {
   const Scenario scenario = LivelyScenario(6.0);
   const Simulated s = simulation::SimulateTracks(scenario).value();
