@@ -8,9 +8,9 @@
 #include "camgyro/types.h"
 #include "camgyro/vins.h"
 #include "core/calibration.h"
+#include "core/effects/device_class.h"
 #include "core/recording.h"
 #include "core/result.h"
-#include "estimator/diagnosis/device_class.h"
 #include "estimator/odometry/odometry.h"
 #include "estimator/vins/initialise.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "camgyro/online_calibration.h"
+#include "core/effects/device_class.h"
 #include "core/recording.h"
-#include "estimator/diagnosis/device_class.h"
 #include "estimator/vins/vins_window.h"
 
 namespace camgyro::api {

@@ -88,7 +88,7 @@ RecordingEstimate EstimateOf(const CalibrationReport& report, const Calibration&
     e.value.segment(at, n) = c.effect_values.segment(own.first, n);
     e.covariance.block(at, at, n, n) = c.effect_covariance.block(own.first, own.first, n, n);
     for (Eigen::Index k = 0; k < n; ++k) {
-      e.prior_sigma[at + k] = own.effect->parameters()[static_cast<size_t>(k)].spread;
+      e.prior_sigma[at + k] = c.effects->parameter(own.first + static_cast<int>(k)).spread;
       // Half of what was believed before, or less.
       e.determined.push_back(std::sqrt(e.covariance(at + k, at + k)) < 0.5 * e.prior_sigma[at + k]);
     }
@@ -144,7 +144,7 @@ Calibration CalibrationOf(const CombinedEstimate& combined, const Calibration& r
     c.determined[i] = combined.repeatability[i].recordings > 0;
   const Eigen::Index n = combined.value.size() - kStateSize;
   auto set = std::make_shared<EffectSet>();
-  for (const EffectSet::Item& item : effects) set->Add(item.entry, item.shape, item.effect);
+  for (const EffectSet::Item& item : effects) set->Add(item);
   c.effects = effects.empty() ? nullptr : set;
   c.effect_values = combined.value.tail(n);
   // With the recordings' spread: a fitted effect has no second sigma of its own.

@@ -6,10 +6,10 @@
 
 #include <cstddef>
 
+#include "core/effects/device_class.h"
 #include "core/recording.h"
 #include "core/result.h"
 #include "estimator/calibrate.h"
-#include "estimator/diagnosis/device_class.h"
 #include "estimator/diagnosis/diagnose.h"
 #include "estimator/start/focal_scan.h"
 #include "frontend/track_recording.h"

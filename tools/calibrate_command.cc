@@ -26,16 +26,14 @@ DEFINE_string(estimator, "window",
               "online estimator: window, or ekf, the filter of the paper, without refinement");
 DEFINE_bool(refine, true,
             "skip the last step, all frames in one problem: the online estimate is the result");
-DEFINE_string(effects, "",
-              "effects to fit as well, separated by commas, each with a shape after a colon if it "
-              "has several: radial_distortion,focal_drift:linear (names: docs/effects.md)");
+DECLARE_string(effects);
 DEFINE_double(search_s, 2.0, "half range of the delay search");
 DECLARE_bool(quiet);
 
 namespace camgyro {
 namespace {
 
-Result<CalibrateOptions> OptionsFromFlags() {
+Result<CalibrateOptions> OptionsFromFlags(DeviceClass device) {
   CalibrateOptions options;
   if (FLAGS_estimator != "window" && FLAGS_estimator != "ekf") {
     return BadUsage("--estimator=" + FLAGS_estimator + ": expected window or ekf");
@@ -52,7 +50,7 @@ Result<CalibrateOptions> OptionsFromFlags() {
   if (Status known = CheckRequireFlag(); !known) return tl::unexpected(known.error());
   options.start.search_s = FLAGS_search_s;
   options.refine = FLAGS_refine;
-  options.effects = FLAGS_effects;
+  options.effects = EffectsFromFlag(device);
   return options;
 }
 
@@ -172,10 +170,10 @@ Status CalibrateDevice(const std::vector<std::string>& paths, const std::string&
 }
 
 Status RunCalibrate(const std::vector<std::string>& arguments) {
-  const Result<CalibrateOptions> options = OptionsFromFlags();
-  if (!options) return tl::unexpected(options.error());
   const Result<DeviceClass> device = DeviceFromFlag();
   if (!device) return tl::unexpected(device.error());
+  const Result<CalibrateOptions> options = OptionsFromFlags(*device);
+  if (!options) return tl::unexpected(options.error());
   const std::string folder = FLAGS_out.empty() ? "calibration" : FLAGS_out;
   if (Status writable = FileSet(folder).CheckWritable(); !writable) return writable;
   if (arguments.size() > 1) return CalibrateDevice(arguments, folder, *options, *device);

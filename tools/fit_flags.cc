@@ -2,6 +2,8 @@
 
 #include <gflags/gflags.h>
 
+#include <regex>
+
 namespace {
 
 // A flag keeps the address of its help.
@@ -20,6 +22,11 @@ DEFINE_string(
     "effects are that nobody has declared, for the error in all");
 DEFINE_bool(robust, true, "no robust loss in window and refinement: plain least squares");
 
+DEFINE_string(effects, "",
+              "effects to fit as well, separated by commas, each with a shape after a colon if it "
+              "has several: radial_distortion,focal_drift:linear (names: docs/effects.md); usual: "
+              "all that such a --device usually has, each held near its usual size");
+
 namespace camgyro {
 
 std::vector<std::string> FitFlags() { return {"residual", "robust"}; }
@@ -28,6 +35,11 @@ Result<DeviceClass> DeviceFromFlag() {
   Result<DeviceClass> device = DeviceClassOf(FLAGS_device);
   if (!device) return BadUsage("--device=" + FLAGS_device + ": " + device.error().message);
   return device;
+}
+
+std::string EffectsFromFlag(DeviceClass device) {
+  return std::regex_replace(FLAGS_effects, std::regex("\\busual\\b(?!:)"),
+                            std::string("usual:") + DeviceClassName(device));
 }
 
 Status ReadFitFlags(PairGraphOptions* options) {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/effects/device_class.h"
 #include "core/result.h"
-#include "estimator/diagnosis/device_class.h"
 #include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
@@ -16,6 +16,9 @@ std::vector<std::string> FitFlags();
 
 // --device. Errors: kBadUsage.
 Result<DeviceClass> DeviceFromFlag();
+
+// --effects, as MakeEffects takes it: "usual" without a class is that of the device.
+std::string EffectsFromFlag(DeviceClass device);
 
 Status ReadFitFlags(PairGraphOptions* options);
 

@@ -23,7 +23,6 @@
 #include "tools/summary.h"
 
 DECLARE_string(calibration);
-DECLARE_string(effects);
 DECLARE_string(out);
 DECLARE_bool(quiet);
 DEFINE_int32(
@@ -88,7 +87,7 @@ Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
   const Result<DeviceClass> device = DeviceFromFlag();
   if (!device) return tl::unexpected(device.error());
   CalibrateOptions options;
-  options.effects = FLAGS_effects;
+  options.effects = EffectsFromFlag(*device);
   Result<CalibrationRun> run = RunCalibration(
       options, OnlineEstimator::kWindow, *device,
       [&](const std::string& stage, double done) { bar->Show(stage, done); }, recording);

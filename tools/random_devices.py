@@ -4,19 +4,22 @@ class usually show and declared by nobody, and prints how the errors compare wit
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
                             [--motions NAME,...] [--clean] [--strange] [--rendered] [--diagnose]
-                            [--stream PREPARE_VIO] [--jobs N] [--camgyro PATH] [KEY=VALUE ...]
+                            [--effects LIST] [--stream PREPARE_VIO] [--jobs N] [--camgyro PATH]
+                            [KEY=VALUE ...]
 
-The sizes are those of the class in estimator/diagnosis/device_class.cc, read from that file. --clean
-draws nothing: for how often a doubt is said of a device that has no effect. --strange also draws how
-each was recorded: motion, length, rates, size of the picture, mounting, stamps of arrival, samples and
-frames that are missing, wrong, few and short-lived tracks, and things that move. --rendered: video of
-a scene, light and compression that are drawn instead of tracks. --diagnose: what `diagnose` makes
-of the devices, instead of `calibrate`. --stream: what the library's Calibrator makes of them, frame by
-frame, with that program (examples/recording); of phones only. KEY=VALUE changes the scenario of all recordings, as in
-`camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the errors within 3
-sigma_total, their rms in sigma_total, the median of sigma_total [px, s, rad/s, rad] and what that is
-of the spread of the errors, the recordings with errors beyond 3 sigma_total (or, with --clean, beyond
-4 sigmas of noise), and the NEES per parameter with the total covariance.
+The sizes are those of the class in core/effects/device_class.cc, read from that file. --clean draws
+nothing: for how often a doubt is said of a device that has no effect. --strange also draws how each
+was recorded: motion, length, rates, size of the picture, mounting, stamps of arrival, samples and
+frames that are missing, wrong, few and short-lived tracks, and things that move. --rendered: video
+of a scene, light and compression that are drawn instead of tracks. --diagnose: what `diagnose`
+makes of the devices, instead of `calibrate`. --effects: that `calibrate` is to fit as well.
+--stream: what the library's Calibrator makes of them, frame by frame, with that program
+(examples/recording); of phones only. KEY=VALUE changes the scenario of all recordings, as in
+`camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the errors within
+3 sigma_total, their rms in sigma_total, the medians of sigma_total and of the errors' size (times
+1.48, the spread) [px, s, rad/s, rad] and their ratio, the recordings with errors beyond 3
+sigma_total (or, with --clean, beyond 4 sigmas of noise), and the NEES per parameter with the total
+covariance.
 """
 import argparse
 import os
@@ -37,7 +40,7 @@ CLASSES = ("phone", "action", "industrial")
 
 def usual_sizes(device):
     """{effect: standard deviation of each parameter} of a class."""
-    with open(SOURCE + "/estimator/diagnosis/device_class.cc", encoding="utf-8") as file:
+    with open(SOURCE + "/core/effects/device_class.cc", encoding="utf-8") as file:
         rows = re.findall(r'\{"(\w+)",\s*"\w+",\s*\{([^}]*)\}', file.read())
     return {name: float(values.split(",")[CLASSES.index(device)]) for name, values in rows}
 
@@ -193,6 +196,8 @@ def run(options, seed):
         else:
             command = [options.camgyro, "diagnose" if options.diagnose else "calibrate", recording,
                        "--out", out, "--device", options.device]
+            if options.effects:
+                command.append("--effects=" + options.effects)
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if not os.path.exists(out + "/calibration.yaml"):
             print(seed, motion, "refused:", done.stderr.strip().split("\n")[-1], flush=True)
@@ -256,6 +261,7 @@ def main():
     parser.add_argument("--strange", action="store_true")
     parser.add_argument("--rendered", action="store_true")
     parser.add_argument("--diagnose", action="store_true")
+    parser.add_argument("--effects", metavar="LIST")
     parser.add_argument("--stream", metavar="PREPARE_VIO")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
@@ -263,6 +269,8 @@ def main():
     options = parser.parse_args()
     if options.stream and (options.diagnose or options.device != "phone"):
         parser.error("--stream: of phones, without --diagnose")
+    if options.effects and (options.diagnose or options.stream):
+        parser.error("--effects: of calibrate alone")
     options.motions = options.motions.split(",")
     first, last = (options.seeds.split("-") * 2)[:2]
     seeds = range(int(first), int(last) + 1)
@@ -280,18 +288,19 @@ def main():
                   + (", rendered" if options.rendered else ""),
                   *np.sum([r["doubts"] for r in results], axis=0)))
     print("| parameter | determined | within 3 sigma_total | rms error in sigma_total | "
-          "sigma_total | sigma_total / spread of errors | rms error in sigma of noise |")
-    print("| --- " * 7 + "|")
+          "sigma_total | spread of errors | sigma_total / spread of errors | "
+          "rms error in sigma of noise |")
+    print("| --- " * 8 + "|")
     for i, name in enumerate(NAMES):
         of = used[:, i]
         if not of.any():
             continue
         spread = 1.4826 * np.median(np.abs(error[of, i]))
-        print("| %s | %d | %.1f %% | %.2f | %.2g | %.2f | %.1f |" % (
+        print("| %s | %d | %.1f %% | %.2f | %.2g | %.2g | %.2f | %.1f |" % (
             name, of.sum(), 100 * np.nanmean(np.abs(z[of, i]) < 3), np.sqrt(np.nanmean(z[of, i]**2)),
-            np.median(sigma[of, i]), np.median(sigma[of, i]) / spread,
+            np.median(sigma[of, i]), spread, np.median(sigma[of, i]) / spread,
             np.sqrt(np.mean((error[of, i] / noise[of, i])**2))))
-    print("| all | %d | %.2f %% | %.2f | | | %.2f |" % (
+    print("| all | %d | %.2f %% | %.2f | | | | %.2f |" % (
         used.sum(), 100 * np.mean(np.abs(z[used]) < 3), np.sqrt(np.mean(z[used]**2)),
         np.sqrt(np.mean((error[used] / noise[used])**2))))
     for r, errors_in_sigmas in zip(results, z):

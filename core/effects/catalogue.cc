@@ -1,7 +1,10 @@
 #include "core/effects/catalogue.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
+#include "core/effects/device_class.h"
 #include "core/effects/entries.h"
 
 namespace camgyro {
@@ -40,10 +43,10 @@ const EffectEntry* FindEffect(const std::string& name) {
 }
 
 void EffectSet::Add(const EffectEntry* entry, std::string shape,
-                    std::shared_ptr<const Effect> effect) {
+                    std::shared_ptr<const Effect> effect, double usual_sigma) {
   const int columns = effect->size();
   has_lens_slope_ = has_lens_slope_ || effect->has_lens_slope();
-  items_.push_back({entry, std::move(shape), std::move(effect), size_});
+  items_.push_back({entry, std::move(shape), std::move(effect), size_, usual_sigma});
   size_ += columns;
 }
 
@@ -55,7 +58,9 @@ bool EffectSet::Has(const std::string& name) const {
 EffectParameter EffectSet::parameter(int column) const {
   for (const Item& item : items_) {
     if (column < item.first + item.effect->size()) {
-      return item.effect->parameters()[static_cast<size_t>(column - item.first)];
+      EffectParameter own = item.effect->parameters()[static_cast<size_t>(column - item.first)];
+      if (item.usual_sigma > 0.0) own.spread = item.usual_sigma;
+      return own;
     }
   }
   return {};
@@ -135,18 +140,51 @@ int EffectSet::frame_time_spread() const {
   return -1;
 }
 
+namespace {
+
+constexpr char kUsual[] = "usual";
+
+// What else devices of a class usually have and this recording can show. What the start has found
+// is larger than usual, and comes from there. A lens that nobody has declared may be any lens, a
+// wide one as well, which a prior of the usual size would pull towards none.
+void AddUsual(const EffectSetup& setup, DeviceClass device, EffectSet* set) {
+  for (const UsualEffect& usual : UsualEffects()) {
+    const EffectEntry* entry = FindEffect(usual.effect);
+    if (!(usual.Sigma(device) > 0.0) || IsDeclared(usual, setup.distortion_model)) continue;
+    if (set->Has(entry->name) || (entry->found_at_start && entry->found_at_start(setup))) continue;
+    const std::vector<std::string> shapes = entry->shapes(setup);
+    if (std::find(shapes.begin(), shapes.end(), usual.shape) == shapes.end()) continue;
+    std::shared_ptr<const Effect> effect = entry->make(setup, usual.shape);
+    if (effect == nullptr || effect->size() == 0) continue;
+    set->Add(entry, usual.shape, std::move(effect),
+             entry->leads_astray ? 0.0 : usual.Sigma(device));
+  }
+}
+
+}  // namespace
+
 Result<EffectSet> MakeEffects(const std::string& list, const EffectSetup& setup) {
   EffectSet set;
+  std::optional<DeviceClass> usual_of;
   for (size_t begin = 0; begin < list.size();) {
     const size_t end = std::min(list.find(',', begin), list.size());
     const std::string word = list.substr(begin, end - begin);
     begin = end + 1;
     const std::string name = word.substr(0, word.find(':'));
+    if (name == kUsual) {
+      const bool has_class = name.size() < word.size();
+      const Result<DeviceClass> device =
+          has_class ? DeviceClassOf(word.substr(name.size() + 1)) : DeviceClass::kPhone;
+      if (!device) return BadUsage("--effects=" + word + ": " + device.error().message);
+      usual_of = *device;
+      continue;
+    }
     std::string known;
     for (const EffectEntry& entry : EffectCatalogue()) known += " " + entry.name;
     const EffectEntry* entry = FindEffect(name);
     if (entry == nullptr) {
-      return BadUsage("--effects: no effect \"" + name + "\"; expected some of" + known);
+      return BadUsage("--effects: no effect \"" + name + "\"; expected some of" + known + ", or " +
+                      kUsual);
     }
     const std::vector<std::string> shapes = entry->shapes(setup);
     const bool has_shape = name.size() < word.size();
@@ -164,6 +202,7 @@ Result<EffectSet> MakeEffects(const std::string& list, const EffectSetup& setup)
     }
     set.Add(entry, shape, std::move(effect));
   }
+  if (usual_of) AddUsual(setup, *usual_of, &set);
   return set;
 }
 

@@ -27,6 +27,8 @@ class EffectSet {
     std::string shape;
     std::shared_ptr<const Effect> effect;
     int first = 0;  // column of its first parameter
+    // Standard deviation of the prior of each parameter, in its unit; 0: EffectParameter::spread.
+    double usual_sigma = 0.0;
   };
 
   // What all effects change at one observation; columns as the parameters of the set.
@@ -36,13 +38,15 @@ class EffectSet {
     Eigen::Matrix<double, 3, Eigen::Dynamic> time;
   };
 
-  void Add(const EffectEntry* entry, std::string shape, std::shared_ptr<const Effect> effect);
+  void Add(const EffectEntry* entry, std::string shape, std::shared_ptr<const Effect> effect,
+           double usual_sigma = 0.0);
+  void Add(const Item& other) { Add(other.entry, other.shape, other.effect, other.usual_sigma); }
 
   const std::vector<Item>& items() const { return items_; }
   int size() const { return size_; }
   bool empty() const { return items_.empty(); }
   bool Has(const std::string& name) const;
-  EffectParameter parameter(int column) const;
+  EffectParameter parameter(int column) const;  // its spread: that of the prior in this set
 
   void ChangeObservation(const Observation& observation, Change* change) const;
   void ChangeRate(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
@@ -75,8 +79,11 @@ struct PairEffects {
 };
 
 // What the user asks for: "name" or "name:shape", separated by commas; without a shape, the usual
-// one of those that the recording can show. Errors: kBadUsage for an unknown name or shape (with
-// all that are known); kCannotEstimate if the recording cannot show the effect.
+// one of those that the recording can show. "usual:CLASS" stands for all others that devices of a
+// class usually have and this recording can show, each with its usual size as the standard
+// deviation of its prior (core/effects/device_class.h); without a class, a phone's. Errors:
+// kBadUsage for an unknown name, shape or class (with all that are known); kCannotEstimate if the
+// recording cannot show the effect.
 Result<EffectSet> MakeEffects(const std::string& list, const EffectSetup& setup);
 
 }  // namespace camgyro

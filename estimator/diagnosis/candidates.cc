@@ -54,7 +54,7 @@ void AddEffect(const Candidate& candidate, Calibration* calibration) {
   if (calibration->effects) {
     for (const auto& item : calibration->effects->items()) {
       if (item.entry == candidate.entry && !item.entry->adds_up) continue;
-      set->Add(item.entry, item.shape, item.effect);
+      set->Add(item);
       for (int k = 0; k < item.effect->size(); ++k) {
         values.push_back(calibration->effect_values[item.first + k]);
       }

@@ -40,12 +40,6 @@ struct Tested {
 // what they say.
 bool Scatters(const Tested& t) { return t.scores.blocks.size() >= kLeastBlocks; }
 
-bool IsDeclared(const Recording& recording, const EffectEntry& entry) {
-  const bool distortion =
-      entry.name == "radial_distortion" || entry.name == "tangential_distortion";
-  return distortion && recording.camera.distortion_model != DistortionModel::kNone;
-}
-
 // The effects of a class that this recording could show and the model has not.
 std::vector<UsualColumns> UsualOf(const std::vector<Candidate>& candidates,
                                   const Recording& recording, const Calibration& model,
@@ -53,10 +47,10 @@ std::vector<UsualColumns> UsualOf(const std::vector<Candidate>& candidates,
   std::vector<UsualColumns> usual;
   for (const UsualEffect& u : UsualEffects()) {
     if (!(u.Sigma(device) > 0.0)) continue;
+    if (IsDeclared(u, recording.camera.distortion_model)) continue;
     if (model.effects && model.effects->Has(u.effect)) continue;
     for (const Candidate& candidate : candidates) {
       if (candidate.entry->name != u.effect || candidate.shape != u.shape) continue;
-      if (IsDeclared(recording, *candidate.entry)) continue;
       usual.push_back({u.effect, candidate.columns(), u.Sigma(device)});
     }
   }
@@ -106,7 +100,7 @@ struct Usual {
   Eigen::VectorXd prior, sigma;  // information of all columns; usual sizes of `columns`
   Eigen::VectorXd c_hat;         // the effects, given the residuals
   Eigen::MatrixXd C;             // their mean square
-  Eigen::MatrixXd X;             // state x columns
+  Eigen::MatrixXd X = Eigen::MatrixXd(kStateSize, 0);  // state x columns
 };
 
 Eigen::MatrixXd ShiftOfState(const Scores& scores, const Usual& u) {
@@ -228,6 +222,29 @@ void AddTotal(const Tested& t, const Usual& u, const StateVector& own_fit,
   }
 }
 
+// What was fitted with the usual size of a class as its prior (EffectSet::Item::usual_sigma) and is
+// larger beyond doubt: it may stand for something that the model lacks.
+void DoubtUnusualSizes(CalibrationReport* report) {
+  const Calibration& c = report->calibration;
+  if (c.effects == nullptr) return;
+  std::string unusual;
+  for (const EffectSet::Item& item : c.effects->items()) {
+    if (!(item.usual_sigma > 0.0)) continue;
+    const double dof = item.effect->size();
+    const double chi2 = c.effect_values.segment(item.first, item.effect->size()).squaredNorm() /
+                        (item.usual_sigma * item.usual_sigma);
+    if (ChiSquareTail(chi2, dof) * static_cast<double>(c.effects->items().size()) > kNoDoubt) {
+      continue;
+    }
+    unusual += Format("%s %s (%.1f times)", unusual.empty() ? "" : ",", item.entry->name.c_str(),
+                      std::sqrt(chi2 / dof));
+  }
+  if (unusual.empty()) return;
+  report->doubts.push_back(
+      "larger than usual for the class of the device:" + unusual +
+      "; it may stand for something that the model lacks, and pull other parameters with it");
+}
+
 // Do the stretches bear a candidate out, every second one by the others' step?
 bool StretchesBearOut(const Tested& t, const Candidate& candidate, const ScoreTest& test) {
   Scores even, odd;
@@ -271,10 +288,15 @@ std::optional<std::string> Suspect(const Tested& t, const Calibration& model,
   const std::string like = is_fitted ? Format("%s of another shape than is fitted (%s)",
                                               best->entry->name.c_str(), best->shape.c_str())
                                      : best->entry->name + ": " + best->entry->explanation;
+  const bool has_usual =
+      model.effects && std::any_of(model.effects->items().begin(), model.effects->items().end(),
+                                   [](const auto& item) { return item.usual_sigma > 0.0; });
   return Format(
       "the pictures show something that the model lacks (p = %.0e), first of all like %s; "
-      "camgyro diagnose finds out what it is, or name it in --effects",
-      std::max(best_p, 1e-99), like.c_str());
+      "camgyro diagnose finds out what it is%s",
+      std::max(best_p, 1e-99), like.c_str(),
+      has_usual ? ", or name it in --effects"
+                : "; --effects=usual fits all that such devices usually have");
 }
 
 }  // namespace
@@ -294,12 +316,11 @@ std::optional<std::string> CheckModel(const Recording& recording, const Calibrat
   report->device_class = DeviceClassName(device);
   const double inflation = std::max(1.0, usual.variance);
   const Usual effects = UsualGiven(t, inflation);
-  if (!effects.columns.empty()) {
-    if (Scatters(t)) ExplainHalves(t, effects, report);
-    const bool fitted = fitted_to == FittedTo::kTheseData;
-    AddTotal(t, effects, fitted ? StateVector(StateVector::Zero()) : StepToOwnFit(t, inflation),
-             report);
-  }
+  if (Scatters(t) && !effects.columns.empty()) ExplainHalves(t, effects, report);
+  const bool fitted = fitted_to == FittedTo::kTheseData;
+  AddTotal(t, effects, fitted ? StateVector(StateVector::Zero()) : StepToOwnFit(t, inflation),
+           report);
+  DoubtUnusualSizes(report);
   return Suspect(t, report->calibration, alone, usual);
 }
 

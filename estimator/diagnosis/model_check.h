@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
+#include "core/effects/device_class.h"
 #include "core/recording.h"
 #include "estimator/calibrate.h"
-#include "estimator/diagnosis/device_class.h"
 
 namespace camgyro {
 

@@ -182,12 +182,12 @@ AllEffects AllEffectsOf(const Calibration& calibration, const EffectSet* candida
   auto set = std::make_shared<EffectSet>();
   if (calibration.effects) {
     for (const auto& item : calibration.effects->items()) {
-      set->Add(item.entry, item.shape, item.effect);
+      set->Add(item);
     }
   }
   const int present = set->size();
   if (candidates != nullptr) {
-    for (const auto& item : candidates->items()) set->Add(item.entry, item.shape, item.effect);
+    for (const auto& item : candidates->items()) set->Add(item);
   }
   AllEffects all;
   if (candidates != nullptr) all.free_turn_rad_s = candidates->widened_sigma(PairLatent::kTurn);

@@ -23,7 +23,7 @@ Calibration WithShape(Calibration calibration, size_t at, const ShapedEffect& st
     if (i == at) {
       set->Add(item.entry, step.shape, step.effect);
     } else {
-      set->Add(item.entry, item.shape, item.effect);
+      set->Add(item);
     }
   }
   calibration.effects = set;

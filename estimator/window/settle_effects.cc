@@ -16,12 +16,12 @@ bool RemakeEffects(const Recording& recording, Calibration* calibration) {
   bool remade = false;
   const EffectSetup setup = MakeEffectSetup(recording, *calibration);
   for (const auto& item : calibration->effects->items()) {
-    std::shared_ptr<const Effect> effect = item.effect;
-    if (effect->depends_on_calibration()) {
-      effect = item.entry->make(setup, item.shape);
+    EffectSet::Item own = item;
+    if (own.effect->depends_on_calibration()) {
+      own.effect = own.entry->make(setup, own.shape);
       remade = true;
     }
-    set->Add(item.entry, item.shape, effect);
+    set->Add(own);
   }
   calibration->effects = set;
   return remade;

@@ -1,12 +1,13 @@
 // What is to be expected of a device whose faults nobody has declared: for each effect of the
 // catalogue, the size that devices of a class usually show.
-#ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_DEVICE_CLASS_H_
-#define CAMGYRO_ESTIMATOR_DIAGNOSIS_DEVICE_CLASS_H_
+#ifndef CAMGYRO_CORE_EFFECTS_DEVICE_CLASS_H_
+#define CAMGYRO_CORE_EFFECTS_DEVICE_CLASS_H_
 
 #include <array>
 #include <string>
 #include <vector>
 
+#include "core/lens.h"
 #include "core/result.h"
 
 namespace camgyro {
@@ -31,6 +32,9 @@ struct UsualEffect {
 
 const std::vector<UsualEffect>& UsualEffects();
 
+// A lens whose distortion is declared has no other than that.
+bool IsDeclared(const UsualEffect& usual, DistortionModel declared);
+
 // "phone", "action", "industrial".
 const char* DeviceClassName(DeviceClass device);
 // Errors: kBadUsage with the names that are known.
@@ -38,4 +42,4 @@ Result<DeviceClass> DeviceClassOf(const std::string& name);
 
 }  // namespace camgyro
 
-#endif  // CAMGYRO_ESTIMATOR_DIAGNOSIS_DEVICE_CLASS_H_
+#endif  // CAMGYRO_CORE_EFFECTS_DEVICE_CLASS_H_

@@ -1,4 +1,4 @@
-#include "estimator/diagnosis/device_class.h"
+#include "core/effects/device_class.h"
 
 namespace camgyro {
 
@@ -76,6 +76,12 @@ const std::vector<UsualEffect>& UsualEffects() {
        "linear acceleration effect in data sheets: MPU-6050 0.1 deg/s per g, ADIS16445 0.015"},
   };
   return effects;
+}
+
+bool IsDeclared(const UsualEffect& usual, DistortionModel declared) {
+  const std::string effect = usual.effect;
+  return declared != DistortionModel::kNone &&
+         (effect == "radial_distortion" || effect == "tangential_distortion");
 }
 
 const char* DeviceClassName(DeviceClass device) {
