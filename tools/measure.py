@@ -51,6 +51,7 @@ EUROC = dict(f=(457.296, 459.429), ratio=458.654 / 457.296, c_x=(367.215, 365.89
              b_x=(-0.0022, -0.0020), b_y=(0.0207, 0.0209), b_z=(0.0758, 0.0781), q=EUROC_Q,
              other_q=(0.712312551, -0.007239826, 0.007541279, 0.701784543))
 FOUND_LENS = "--effects=radial_distortion,aspect_ratio"
+USUAL = "--effects=usual"
 
 
 def rows_of(name, known, *variants):
@@ -63,7 +64,7 @@ def rows_of(name, known, *variants):
 RECORDINGS = (
     # README: K_cc9_600_800 of the source; a stamp is the start of a frame, exposures 5.1..5.7 ms.
     rows_of("phone-cc9-street", dict(f=575.0448, c_x=406.0101, c_y=309.0112, t_d=-2.6e-3,
-                                     axes=ANDROID))
+                                     axes=ANDROID), USUAL)
     # README: checkerboard calibration; the source maps the gyro as (x, -y, -z).
     + rows_of("iphone-cards", dict(f=567.30, c_x=243.35, c_y=342.38, axes=(0, 1, 0, 0)),
               "--effects=readout_direction:columns")
@@ -71,15 +72,17 @@ RECORDINGS = (
     + rows_of("gopro-hero7-hypersmooth/hero7.mp4", {})
     + rows_of("tablet-shield-burst", {})
     + rows_of("euroc-v101-flight", EUROC, "lens --device=industrial",
-              "--effects=radial_distortion:kannala_brandt,aspect_ratio --device=industrial")
+              "--effects=radial_distortion:kannala_brandt,aspect_ratio --device=industrial",
+              USUAL + " --device=industrial")
     + rows_of("euroc-v101-rest", EUROC)
     # README: the axis map is Android's.
-    + rows_of("phone-edge-hand", dict(axes=ANDROID), "--effects=radial_distortion")
-    + rows_of("ov_handheld_gs", None, "lens --device=industrial", FOUND_LENS)
-    + rows_of("ov_handheld_rs", None, "lens --device=industrial", FOUND_LENS)
+    + rows_of("phone-edge-hand", dict(axes=ANDROID), "--effects=radial_distortion", USUAL)
+    + rows_of("ov_handheld_gs", None, "lens --device=industrial", FOUND_LENS, USUAL)
+    + rows_of("ov_handheld_rs", None, "lens --device=industrial", FOUND_LENS, USUAL)
     + rows_of("ov_handheld_rs_skew", None, "lens --device=industrial",
-              FOUND_LENS + ",clock_skew")
-    + [(name, FOUND_LENS, None) for name in ("ov_corridor_rs", "ov_corridor_rs_klt", "ov_mav_gs")]
+              FOUND_LENS + ",clock_skew", USUAL)
+    + [(name, flags, None) for name in ("ov_corridor_rs", "ov_corridor_rs_klt", "ov_mav_gs")
+       for flags in (FOUND_LENS, USUAL)]
     + [("tablet-attitude/D%02d" % i, "", dict(axes=ANDROID))
        for i in (1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13)]
     + [("tango-walk/imu%d" % i, "", {}) for i in range(1, 6)]
