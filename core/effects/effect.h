@@ -126,7 +126,8 @@ struct EffectSetup {
   double frame_stamp_jitter_s = 0.0;
   std::vector<double> frame_delays_s;  // of each frame with the effects on time; empty: delay_s
   Eigen::Matrix3d R_gyro_cam = Eigen::Matrix3d::Identity();
-  bool has_pixels = true;                                     // false: attitudes
+  bool has_pixels = true;  // false: attitudes
+  double edge_rad = 1.0;   // angle between the axis and a corner of the picture, about
   DistortionModel distortion_model = DistortionModel::kNone;  // declared
 
   // The frames' span on the gyro clock [s].

@@ -102,6 +102,9 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   setup.readout_s = calibration.readout_s;
   setup.R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
   setup.has_pixels = !recording.matches.empty() || !recording.tracks.empty();
+  if (setup.has_pixels) {
+    setup.edge_rad = std::atan2(0.5 * setup.size_px.norm(), calibration.lens[kFocal]);
+  }
   if (recording.camera_stamps && recording.camera_stamps->repaired) {
     setup.frame_stamp_jitter_s = recording.camera_stamps->jitter_s;
   }
