@@ -36,6 +36,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   options.significance = FLAGS_significance;
   const Result<DeviceClass> device = DeviceFromFlag();
   if (!device) return tl::unexpected(device.error());
+  options.calibrate.effects = EffectsFromFlag(*device);
   FileSet files(FLAGS_out.empty() ? "calibration" : FLAGS_out);
   if (Status writable = files.CheckWritable(); !writable) return writable;
   Result<Recording> recording = OpenRecording(arguments[0]);
@@ -110,7 +111,7 @@ Command DiagnoseCommand() {
       "the closed loop: finds what the model lacks in frames that the fit has not seen, names the "
       "effect, adds it, and reports the error before and after, into diagnosis.yaml (and "
       "calibration.yaml with the effects, calibration_before.yaml without)";
-  command.flags = {"out", "device", "significance"};
+  command.flags = {"out", "effects", "device", "significance"};
   for (const std::string& name : InputFlags()) command.flags.push_back(name);
   command.flags.insert(command.flags.end(), {"require", "search_s", "quiet"});
   command.run = RunDiagnose;

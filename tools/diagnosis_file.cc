@@ -223,6 +223,11 @@ std::string NothingAddedText(const DiagnosisRound& round) {
                 round.candidates.size(), best->name.c_str(), best->p_value);
 }
 
+std::string NameOfModel(const Diagnosis& diagnosis) {
+  const bool plain = !diagnosis.before || diagnosis.before->calibration.effects == nullptr;
+  return plain ? "the plain model" : "those of the model";
+}
+
 std::string DiagnosisText(const Diagnosis& d, bool attitudes) {
   std::string text = "diagnosis\n";
   for (const DataFault& fault : d.faults) {
@@ -243,7 +248,7 @@ std::string DiagnosisText(const Diagnosis& d, bool attitudes) {
             "; turn about all axes, fast and slow, near and far from the scene\n";
   }
   text += "verdict    ";
-  text += d.effects.empty() ? "no effect beyond the plain model" : Joined(d.effects);
+  text += d.effects.empty() ? "no effect beyond " + NameOfModel(d) : Joined(d.effects);
   if (d.unexplained_structure) {
     text += "; structure is left that nothing in the catalogue explains: " + Joined(d.where);
   }

@@ -18,6 +18,9 @@ std::string DiagnosisYaml(const Diagnosis& diagnosis);
 // residual_maps.csv: every cell of every map, before and after the effects.
 std::string ResidualMapsCsv(const Diagnosis& diagnosis);
 
+// What was looked for beyond: "the plain model", or the one that has effects.
+std::string NameOfModel(const Diagnosis& diagnosis);
+
 // Of a round that has added nothing: what came nearest, and why it is not named.
 std::string NothingAddedText(const DiagnosisRound& round);
 

@@ -19,8 +19,9 @@ std::vector<TableCell> Row(const std::vector<std::string>& texts) {
 }
 
 ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
-  std::string html = Paragraph(d.effects.empty() ? "No effect beyond the plain model was found."
-                                                 : "Found: " + Joined(d.effects) + ".");
+  std::string html =
+      Paragraph(d.effects.empty() ? "No effect beyond " + NameOfModel(d) + " was found."
+                                  : "Found: " + Joined(d.effects) + ".");
   if (!d.not_tested.empty()) html += Paragraph("Nothing was tested: " + d.not_tested + ".");
   if (d.unexplained_structure) {
     html += Paragraph(

@@ -12,7 +12,7 @@ nothing: for how often a doubt is said of a device that has no effect. --strange
 was recorded: motion, length, rates, size of the picture, mounting, stamps of arrival, samples and
 frames that are missing, wrong, few and short-lived tracks, and things that move. --rendered: video
 of a scene, light and compression that are drawn instead of tracks. --diagnose: what `diagnose`
-makes of the devices, instead of `calibrate`. --effects: that `calibrate` is to fit as well.
+makes of the devices, instead of `calibrate`, and what it names. --effects: to be fitted as well.
 --stream: what the library's Calibrator makes of them, frame by frame, with that program
 (examples/recording); of phones only. KEY=VALUE changes the scenario of all recordings, as in
 `camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the errors within
@@ -26,6 +26,7 @@ import os
 import re
 import subprocess
 import tempfile
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -206,6 +207,10 @@ def run(options, seed):
             calibration = yaml.safe_load(file)
         with open(recording + "/truth.yaml", encoding="utf-8") as file:
             truth = yaml.safe_load(file)
+        named = []
+        if options.diagnose:
+            with open(out + "/diagnosis.yaml", encoding="utf-8") as file:
+                named = yaml.safe_load(file)["verdict"]["effects"]
         doubts = ["the pictures show something" in done.stdout,
                   "the two halves of the recording disagree" in done.stdout]
         if not options.clean:
@@ -215,7 +220,7 @@ def run(options, seed):
         total = np.array(calibration["covariance"]["total"])
         determined = np.array([name not in calibration["quality"]["unobservable"]
                                for name in calibration["covariance"]["order"]])
-        return dict(error=error, noise=noise, total=total, doubts=doubts, determined=determined,
+        return dict(error=error, noise=noise, total=total, doubts=doubts, determined=determined, named=named,
                     name="%s %d" % (motion, seed))
 
 
@@ -269,8 +274,8 @@ def main():
     options = parser.parse_args()
     if options.stream and (options.diagnose or options.device != "phone"):
         parser.error("--stream: of phones, without --diagnose")
-    if options.effects and (options.diagnose or options.stream):
-        parser.error("--effects: of calibrate alone")
+    if options.effects and options.stream:
+        parser.error("--effects: not with --stream")
     options.motions = options.motions.split(",")
     first, last = (options.seeds.split("-") * 2)[:2]
     seeds = range(int(first), int(last) + 1)
@@ -287,6 +292,10 @@ def main():
                   (", strangely recorded" if options.strange else "")
                   + (", rendered" if options.rendered else ""),
                   *np.sum([r["doubts"] for r in results], axis=0)))
+    if options.diagnose:
+        named = Counter(name for r in results for name in r["named"])
+        print("named in %d: %s" % (sum(bool(r["named"]) for r in results),
+                                   ", ".join("%s %d" % pair for pair in named.most_common())))
     print("| parameter | determined | within 3 sigma_total | rms error in sigma_total | "
           "sigma_total | spread of errors | sigma_total / spread of errors | "
           "rms error in sigma of noise |")

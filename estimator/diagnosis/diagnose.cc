@@ -36,7 +36,7 @@ void AddFoundAtStart(const CalibrationReport& report, Diagnosis* diagnosis) {
   const Calibration& c = report.calibration;
   if (c.effects == nullptr) return;
   for (const EffectSet::Item& item : c.effects->items()) {
-    if (!item.entry->found_at_start || !IsSeen(item, c)) continue;
+    if (!item.entry->found_at_start || item.usual_sigma > 0.0 || !IsSeen(item, c)) continue;
     diagnosis->faults.push_back(
         {item.entry->name, "found at the start: " + item.entry->explanation, item.entry->advice});
     AddUnique(item.entry->name, &diagnosis->effects);

@@ -302,6 +302,23 @@ TEST_F(CommandsTest, DiagnoseWritesItsAccount) {
 // Measured: attitudes with errors of their own kind. gyro_axis_delay has p = 7e-8 (D05),
 // delay_wander 1e-27 (D04), but what they gain scatters from block to block by three times of what
 // a right effect's does, and in the frames kept for the report they gain nothing.
+// What such a device usually has is in the model and not named; what is beside it is.
+TEST_F(CommandsTest, DiagnoseNamesNothingThatIsUsual) {
+  std::string longer = kHandheldScenario;
+  longer.replace(longer.find("duration_s: 4"), 13, "duration_s: 9");
+  const std::string usual =
+      "gyro_scale: {error: [0.01, 0.01, -0.01]}, gyro_misalignment: {xy: 0.007, xz: -0.006}";
+  Simulate(longer + "effects: {" + usual + "}\n", "a");
+  const RunResult silent = Run("diagnose a --effects=usual --out=silent");
+  ASSERT_EQ(silent.exit_code, 0) << silent.err;
+  EXPECT_THAT(silent.out, HasSubstr("verdict    no effect beyond those of the model"));
+  Simulate(longer + "effects: {" + usual + ", delay_step: {step_s: 0.008, time_s: 4.5}}\n", "b");
+  ASSERT_EQ(Run("diagnose b --effects=usual --out=named").exit_code, 0);
+  const YAML::Node verdict = YAML::LoadFile(Path("named/diagnosis.yaml"))["verdict"];
+  EXPECT_EQ(verdict["effects"].as<std::vector<std::string>>(),
+            std::vector<std::string>{"delay_step"});
+}
+
 TEST_F(CommandsTest, DiagnoseMeasuredAttitudesWithoutAName) {
   for (const char* name : {"D04", "D05"}) {
     const auto recording = MeasuredData(std::string("tablet-attitude/") + name);
