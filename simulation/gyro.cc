@@ -28,8 +28,11 @@ class Element {
   // Times must not decrease.
   Vector3d At(double time_s) {
     if (time_constant_s_ <= 0.0) return Rate(time_s);
-    // y' = (w - y) / T over steps of at most 0.5 ms: exact decay, Simpson's rule for the input.
-    const int steps = static_cast<int>(std::ceil((time_s - time_s_) / 5e-4));
+    // y' = (w - y) / T over steps of at most 0.5 ms and T / 2: exact decay, Simpson's rule for the
+    // input. Over longer steps than T the decay is no polynomial, and the rule makes the rate
+    // larger.
+    const double longest_s = std::min(5e-4, 0.5 * time_constant_s_);
+    const int steps = static_cast<int>(std::ceil((time_s - time_s_) / longest_s));
     const double h = steps > 0 ? (time_s - time_s_) / steps : 0.0;
     const double whole = std::exp(-h / time_constant_s_);
     const double half = std::exp(-0.5 * h / time_constant_s_);
