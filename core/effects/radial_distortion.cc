@@ -21,7 +21,7 @@ class RadTan final : public Effect {
 // Of Kannala & Brandt's series: the difference from the declared lens, so for a pinhole that from
 // the series of tan. An equidistant fisheye lens without further distortion has some -1/3, -2/15.
 // What is plausible of a term is what it makes of the angle at the edge of the picture: within the
-// 40 degrees that a phone sees, theta^7 is small, and a kb3 of -3 bends less than a kb1 of -0.4.
+// 40 degrees that a phone sees, theta^7 is small: a kb3 of -3 does there what a kb1 of -0.7 does.
 class KannalaBrandt final : public Effect {
  public:
   explicit KannalaBrandt(double edge_rad)
