@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/linear_algebra.h"
+
 namespace camgyro {
 
 DistortionCoefficients StandardDistortion(DistortionModel model, const LensParameters& lens,
@@ -35,10 +37,9 @@ DistortionCoefficients StandardDistortion(DistortionModel model, const LensParam
   }
   constexpr int kAngles = 200;
   const double widest = radius > 0.0 ? std::atan(radius) : 1.0;
-  Eigen::Matrix<double, kAngles, 4> A;
-  Eigen::Matrix<double, kAngles, kLensSize> by_lens =
-      Eigen::Matrix<double, kAngles, kLensSize>::Zero();
-  Eigen::Matrix<double, kAngles, 1> rest;  // what the coefficients do not change
+  Eigen::MatrixXd A(kAngles, 4);
+  Eigen::MatrixXd by_lens = Eigen::MatrixXd::Zero(kAngles, kLensSize);
+  Eigen::VectorXd rest(kAngles);  // what the coefficients do not change
   for (int i = 0; i < kAngles; ++i) {
     const double theta = widest * (i + 0.5) / kAngles, r = std::tan(theta);
     for (int k = 0; k < 4; ++k) A(i, k) = std::pow(theta, 2 * k + 3);
@@ -47,9 +48,8 @@ DistortionCoefficients StandardDistortion(DistortionModel model, const LensParam
     by_lens.block<1, 4>(i, kKb1) = A.row(i);
     rest[i] = r - theta;
   }
-  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, kAngles, 4>> solver(A);
-  result.by_lens = solver.solve(by_lens);
-  result.k = solver.solve(rest + by_lens * axial);
+  result.by_lens = LeastSquares(A, by_lens);
+  result.k = LeastSquares(A, rest + by_lens * axial);
   return result;
 }
 

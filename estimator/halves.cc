@@ -1,10 +1,10 @@
 #include "estimator/halves.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "estimator/astray.h"
 
@@ -22,11 +22,7 @@ constexpr double kSettledScale = 0.1;
 
 // Chi-square per parameter of a difference of states.
 double Chi2PerParameter(const StateVector& d, const StateCovariance& covariance) {
-  // Unit diagonal before the factorisation: the units differ by orders of magnitude.
-  const StateVector scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const StateCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-  const StateVector z = scale.cwiseProduct(d);
-  return z.dot(correlation.ldlt().solve(z)) / kStateSize;
+  return SquaredMahalanobis(d, covariance) / kStateSize;
 }
 
 }  // namespace

@@ -164,11 +164,13 @@ RotationFit TwoViewProblem::FitWithCovariance(const TwoViewMotion& motion,
   if (!(count > 5.0) || !(slope > 0.0)) return fit;
   fit.variance_px = sum_psi_sq / (count - 5.0) / (slope * slope);
 
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> relative(
-      fit.variance_px * noise, information.bottomRightCorner<2, 2>());
-  if (relative.info() != Eigen::Success) return fit;
-  // Eigenvectors V have V' I V = 1, so that V^-1 = V' I.
-  const Eigen::Matrix2d basis = information.bottomRightCorner<2, 2>() * relative.eigenvectors();
+  // The noise in units of the information, I = L L': its eigenvectors U, and L U in those of I.
+  const Eigen::LLT<Eigen::Matrix2d> of_direction(information.bottomRightCorner<2, 2>());
+  if (of_direction.info() != Eigen::Success) return fit;
+  const Eigen::Matrix2d L = of_direction.matrixL(), L_inverse = L.inverse();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> relative;
+  relative.computeDirect(fit.variance_px * L_inverse * noise * L_inverse.transpose());
+  const Eigen::Matrix2d basis = L * relative.eigenvectors();
   information.bottomRightCorner<2, 2>() -=
       basis * relative.eigenvalues().cwiseMin(0.5).asDiagonal() * basis.transpose();
 

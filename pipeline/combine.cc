@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/linear_algebra.h"
 #include "estimator/diagnosis/score_test.h"
 
 namespace camgyro {
@@ -55,10 +56,10 @@ void TakePriorOut(const RecordingEstimate& e, const Indices& at, Measurement* m)
   const Eigen::VectorXd inverse = scale.cwiseInverse();
   const Eigen::MatrixXd precision =
       (inverse.asDiagonal() * Block(e.covariance, at) * inverse.asDiagonal()).inverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(precision);
-  const Eigen::VectorXd data = (eigen.eigenvalues().array() - 1.0).max(kLeastInformation);
+  const SymmetricSpectrum eigen = SpectrumOfSymmetric(precision);
+  const Eigen::VectorXd data = (eigen.values.array() - 1.0).max(kLeastInformation);
   const Eigen::MatrixXd covariance =
-      eigen.eigenvectors() * data.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+      eigen.vectors * data.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   const Eigen::VectorXd value = prior + scale.cwiseProduct(covariance * (precision * offset));
   for (size_t i = 0; i < at.size(); ++i) m->value[at[i]] = value[static_cast<Eigen::Index>(i)];
   SetBlock(scale.asDiagonal() * covariance * scale.asDiagonal(), at, &m->covariance);

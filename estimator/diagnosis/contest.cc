@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "estimator/astray.h"
 #include "estimator/diagnosis/gain_rule.h"
@@ -275,7 +276,7 @@ double PValueOfFit(const Calibration& fit, double inflation, double gain) {
   const int n = item.effect->size();
   const Eigen::VectorXd value = fit.effect_values.segment(item.first, n);
   const Eigen::MatrixXd covariance = fit.effect_covariance.block(item.first, item.first, n, n);
-  const double statistic = value.dot(covariance.completeOrthogonalDecomposition().solve(value));
+  const double statistic = value.dot(LeastSquares(covariance, value).col(0));
   return ChiSquareTail((statistic + std::max(0.0, gain)) / std::max(1.0, inflation), 2 * n);
 }
 

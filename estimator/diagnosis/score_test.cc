@@ -8,6 +8,7 @@
 #include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
 
+#include "core/linear_algebra.h"
 #include "estimator/diagnosis/thresholds.h"
 
 namespace camgyro {
@@ -117,13 +118,13 @@ ScoreTest Judge(const Effective& e, const Eigen::VectorXd& prior, const Scatter&
   ScoreTest test;
   // Directions with information beyond the prior's.
   const Eigen::VectorXd scale = prior.cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * e.M *
-                                                             scale.asDiagonal());
+  const SymmetricSpectrum eigen =
+      SpectrumOfSymmetric(scale.asDiagonal() * e.M * scale.asDiagonal());
   std::vector<Eigen::VectorXd> directions;  // whitening
-  for (Eigen::Index i = 0; i < eigen.eigenvalues().size(); ++i) {
-    const double value = eigen.eigenvalues()[i];
+  for (Eigen::Index i = 0; i < eigen.values.size(); ++i) {
+    const double value = eigen.values[i];
     if (value > kLeastInformation) {
-      directions.emplace_back(scale.cwiseProduct(eigen.eigenvectors().col(i)) / std::sqrt(value));
+      directions.emplace_back(scale.cwiseProduct(eigen.vectors.col(i)) / std::sqrt(value));
     }
   }
   test.dof = static_cast<int>(directions.size());

@@ -5,12 +5,13 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
+
+#include "core/linear_algebra.h"
 
 namespace camgyro {
 namespace {
@@ -154,11 +155,10 @@ RelativeYawPosition WayBetween(const OdometryPose& a, const OdometryPose& b) {
   // In units of the least sigmas, eigenvalues of at least one.
   const Vector4d least(kLeastWayM, kLeastWayM, kLeastWayM, kLeastTurnRad);
   const Vector4d unit = least.cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Matrix4d> eigen(unit.asDiagonal() * increment *
-                                                      unit.asDiagonal());
-  way.covariance = least.asDiagonal() * eigen.eigenvectors() *
-                   eigen.eigenvalues().cwiseMax(1.0).asDiagonal() *
-                   eigen.eigenvectors().transpose() * least.asDiagonal();
+  const SymmetricSpectrum eigen =
+      SpectrumOfSymmetric(unit.asDiagonal() * increment * unit.asDiagonal());
+  way.covariance = least.asDiagonal() * eigen.vectors * eigen.values.cwiseMax(1.0).asDiagonal() *
+                   eigen.vectors.transpose() * least.asDiagonal();
   return way;
 }
 

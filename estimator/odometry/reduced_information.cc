@@ -3,10 +3,11 @@
 #include <ceres/cost_function.h>
 #include <glog/logging.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "core/linear_algebra.h"
 
 namespace camgyro {
 namespace {
@@ -30,14 +31,14 @@ Spectrum SpectrumOf(const MatrixXd& H, double least_information = kLeastInformat
   Spectrum spectrum;
   spectrum.unit = H.diagonal().unaryExpr(
       [](double value) { return value > 0.0 ? 1.0 / std::sqrt(value) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(spectrum.unit.asDiagonal() * H *
-                                                      spectrum.unit.asDiagonal());
-  const VectorXd& all = eigen.eigenvalues();  // ascending
+  const SymmetricSpectrum eigen =
+      SpectrumOfSymmetric(spectrum.unit.asDiagonal() * H * spectrum.unit.asDiagonal());
+  const VectorXd& all = eigen.values;
   const double least = least_information * std::max(0.0, all[all.size() - 1]);
   Eigen::Index first = 0;
   while (first < all.size() && !(all[first] > least)) ++first;
   spectrum.values = all.tail(all.size() - first);
-  spectrum.directions = eigen.eigenvectors().rightCols(all.size() - first);
+  spectrum.directions = eigen.vectors.rightCols(all.size() - first);
   return spectrum;
 }
 

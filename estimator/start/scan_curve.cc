@@ -1,8 +1,9 @@
 #include "estimator/start/scan_curve.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace camgyro {
 namespace {
@@ -14,7 +15,7 @@ constexpr double kTruncateSigmas = 3.0;  // of the norm of two axes
 Eigen::MatrixXd FitParabola(const Eigen::VectorXd& x, const Eigen::MatrixXd& y) {
   Eigen::MatrixXd powers(x.size(), 3);
   powers << Eigen::VectorXd::Ones(x.size()), x, x.cwiseAbs2();
-  return powers.colPivHouseholderQr().solve(y);
+  return LeastSquares(powers, y);
 }
 
 }  // namespace

@@ -1,8 +1,9 @@
 #include "estimator/vins/alignment.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace camgyro {
 namespace {
@@ -64,7 +65,7 @@ class LinearAlignment {
         b.segment<3>(6 * i + 3) = w_v * (R * d.dv + dt * known);
       }
       A.block<3, 3>(rows, bias) = Matrix3d::Identity() / bias_sigma_m_s2_;
-      x = A.colPivHouseholderQr().solve(b);
+      x = LeastSquares(A, b);
       const Eigen::VectorXd residual = A * x - b;
       double sum_p = 0.0, sum_v = 0.0;
       for (int i = 0; i + 1 < count_; ++i) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/linear_algebra.h"
 #include "core/robust_statistics.h"
 
 namespace camgyro {
@@ -129,11 +130,9 @@ class Solver {
       H -= coupling.transpose() * PseudoInverse(M) * coupling;
     }
     // The first centre is the origin.
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-        H.bottomRightCorner(size - 3, size - 3));
     structure_.centres.setZero();
     Eigen::Map<Eigen::VectorXd>(structure_.centres.data(), size).tail(size - 3) =
-        eigen.eigenvectors().col(0);
+        SpectrumOfSymmetric(H.bottomRightCorner(size - 3, size - 3)).vectors.col(0);
   }
 
   // Points, and the sign of the solution that has most of them before the camera.

@@ -2,10 +2,10 @@
 
 #include <gmock/gmock.h>
 
-#include <Eigen/Cholesky>
 #include <random>
 #include <vector>
 
+#include "core/linear_algebra.h"
 #include "tests/frontend/waves.h"
 
 namespace camgyro {
@@ -89,7 +89,7 @@ TEST(AlignPatch, CovarianceIsThatOfItsErrors) {
       if (!aligned) continue;
       const Vector2d error = aligned->px - whole;
       // Noise of both pictures.
-      chi2 += error.dot(aligned->covariance.ldlt().solve(error)) / (2.0 * 3.0 * 3.0);
+      chi2 += SquaredMahalanobis(error, aligned->covariance) / (2.0 * 3.0 * 3.0);
       count += 2;
     }
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/linear_algebra.h"
 #include "core/pair_model.h"
 #include "core/rotation_chain.h"
 #include "core/time.h"
@@ -53,12 +54,12 @@ std::vector<Vector3d> Directions(const std::vector<RayPair>& rays, double varian
 
 // A S A' with the 2 x 2 matrix S pseudo-inverted: what a free tau takes away.
 MatrixXd Explained(const MatrixXd& cross, const Eigen::Matrix2d& information) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(information);
+  const SymmetricSpectrum eigen = SpectrumOfSymmetric(information);
   MatrixXd result = MatrixXd::Zero(cross.rows(), cross.rows());
   for (int i = 0; i < 2; ++i) {
-    if (eigen.eigenvalues()[i] < 1e-6) continue;  // [1 / rad^2], of a direction: knows nothing
-    const VectorXd v = cross * eigen.eigenvectors().col(i);
-    result += v * v.transpose() / eigen.eigenvalues()[i];
+    if (eigen.values[i] < 1e-6) continue;  // [1 / rad^2], of a direction: knows nothing
+    const VectorXd v = cross * eigen.vectors.col(i);
+    result += v * v.transpose() / eigen.values[i];
   }
   return result;
 }

@@ -1,10 +1,11 @@
 #include "tools/comparison/statistics.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "core/linear_algebra.h"
 
 namespace camgyro::comparison {
 namespace {
@@ -12,11 +13,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 double Nees(const StateVector& error, const StateCovariance& covariance) {
-  // Unit diagonal before the factorisation: the units differ by orders of magnitude.
-  const StateVector scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const StateCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-  const StateVector z = scale.cwiseProduct(error);
-  return z.dot(correlation.ldlt().solve(z)) / kStateSize;
+  return SquaredMahalanobis(error, covariance) / kStateSize;
 }
 
 double Mean(const std::vector<double>& values) {

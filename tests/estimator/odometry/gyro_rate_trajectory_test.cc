@@ -29,8 +29,7 @@ struct TrueKeyframes {
     OdometryPose origin;
     origin.time_ns = r.gyro[100].stamp_ns;
     // Upright as the simulator's camera is at time 0; any pose would do.
-    const Eigen::Quaterniond up =
-        Eigen::Quaterniond::FromTwoVectors(-Vector3d::UnitY(), Vector3d::UnitZ());
+    const Eigen::Quaterniond up = UpOfSimulator();
     for (size_t i = 100; i + 100 < r.gyro.size(); i += 50) {
       const VinsState truth = TrueState(walk.simulated, walk.scenario, r.gyro[i].stamp_ns);
       OdometryPose pose;

@@ -51,14 +51,17 @@ inline Walk WalkFor(double duration_s, uint64_t seed = 1) {
   return WalkOf(scenario);
 }
 
+// The simulator's world has y down; this turns it so that z is up.
+inline Eigen::Quaterniond UpOfSimulator() {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(-0.5 * M_PI, Eigen::Vector3d::UnitX()));
+}
+
 // The truth in the odometry's world: z up, at the pose `at` the estimate's position and yaw.
 class TruthFrom {
  public:
   TruthFrom(const Walk& walk, const OdometryPose& at) : walk_(walk) {
     const VinsState truth = TrueState(walk.simulated, walk.scenario, at.time_ns);
-    // The simulator's world has y down.
-    const Eigen::Quaterniond up =
-        Eigen::Quaterniond::FromTwoVectors(-Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ());
+    const Eigen::Quaterniond up = UpOfSimulator();
     const Eigen::Matrix3d R =
         (at.state.q_world_gyro * (up * truth.q_world_gyro).conjugate()).toRotationMatrix();
     const double yaw = std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1));

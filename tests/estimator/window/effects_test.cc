@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/linear_algebra.h"
 #include "core/so3.h"
 #include "estimator/window/direction_search.h"
 #include "estimator/window/pair_graph.h"
@@ -51,7 +52,7 @@ double Rms(const EstimationInput& input, const Calibration& calibration) {
       J.row(row) << residual.by_tau.transpose(), shares[0] * residual.by_tau.transpose(),
           shares[1] * residual.by_tau.transpose();
     }
-    r -= J * J.completeOrthogonalDecomposition().solve(r);
+    r -= J * LeastSquares(J, r);
     sum_sq += 0.0025 * r.squaredNorm();
     count += static_cast<int>(r.size());
   }

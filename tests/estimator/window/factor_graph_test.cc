@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/linear_algebra.h"
 #include "core/rotation_chain.h"
 #include "core/so3.h"
 #include "factors/bias_walk.h"
@@ -127,7 +128,7 @@ void AddLinearStep(int i, FactorGraph* graph) {
 void SolveLinear(FactorGraph* graph) {
   ASSERT_TRUE(graph->Solve(kToTheEnd).usable);
   const Linearization linear = graph->Linearize(AllKeys(*graph)).value();
-  const VectorXd step = -linear.J.colPivHouseholderQr().solve(linear.residuals);
+  const VectorXd step = -LeastSquares(linear.J, linear.residuals);
   EXPECT_LT(step.norm(), 1e-7);
   for (size_t k = 0; k < linear.blocks.size(); ++k) {
     graph->value(linear.blocks[k]) +=

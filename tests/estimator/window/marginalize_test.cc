@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/linear_algebra.h"
 #include "tests/estimator/window/linear_factor.h"
 
 namespace camgyro {
@@ -66,8 +67,8 @@ TEST(EliminateLeading, AgreesWithSchurAndWithInvertCutInvert) {
     EXPECT_LT((relative(got.information) - cut).norm(), 1e-9);
 
     // The optimum of the remainder is the staying part of the whole optimum.
-    const VectorXd whole = -unit.householderQr().solve(r).cwiseQuotient(norms);
-    const VectorXd rest = -e.sqrt_information.householderQr().solve(e.offset);
+    const VectorXd whole = -LeastSquares(unit, r).cwiseQuotient(norms);
+    const VectorXd rest = -LeastSquares(e.sqrt_information, e.offset);
     EXPECT_LT((rest - whole.tail(staying)).cwiseProduct(scale).norm(), 1e-9);
   }
 }
