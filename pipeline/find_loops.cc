@@ -241,8 +241,6 @@ std::string LoopsInWords(const LoopClosure& closure) {
 Result<LoopClosure> FindLoops(const Recording& recording, const OdometryRun& run,
                               double gravity_m_s2, const std::function<void(double)>& progress) {
   LoopClosure closure;
-  closure.keyframes = run.keyframes;
-  closure.poses = run.poses;
   if (!recording.HasImages()) {
     closure.unavailable = "no pictures: tracks alone do not say what a place looks like";
     return closure;
@@ -275,6 +273,7 @@ Result<LoopClosure> FindLoops(const Recording& recording, const OdometryRun& run
   Result<ClosedLoops> closed = CloseLoops(run.keyframes, edges);
   if (!closed) return tl::unexpected(closed.error());
   for (size_t i = 0; i < edges.size(); ++i) closure.loops[i].believed = closed->believed[i];
+  if (closure.Believed() == 0) return closure;
   closure.keyframes = std::move(closed->keyframes);
   closure.poses = MoveWithKeyframes(run.poses, closure.keyframes);
   return closure;

@@ -101,7 +101,6 @@ Result<LoopClosure> LoopsOf(const Recording& recording, const OdometryRun& run, 
   if (FLAGS_loops == "off") {
     LoopClosure off;
     off.unavailable = "--loops=off";
-    off.keyframes = run.keyframes;
     return off;
   }
   return FindLoops(recording, run, gravity_m_s2, [&](double done) { bar->Show("loops", done); });
