@@ -166,6 +166,9 @@ void EmitQuality(YAML::Emitter& out, const CalibrationReport& report, bool attit
   if (report.unseen) {
     out << YAML::Key << "unseen_rms_px" << YAML::Value << report.unseen->rms_px;
   }
+  if (report.halves_chi2 > 0.0) {
+    out << YAML::Key << "halves_chi2" << YAML::Value << report.halves_chi2;
+  }
   std::vector<std::string> unobservable;
   for (size_t i = 0; i < kStateSize; ++i) {
     if (!report.calibration.determined[i]) unobservable.push_back(StateNames()[i]);

@@ -106,9 +106,10 @@ Result<Calibrated> CalibrateOne(const std::string& path, const std::string& fold
   if (!FLAGS_quiet) {
     const std::vector<std::string> found(recording->notes.begin() + static_cast<long>(shown),
                                          recording->notes.end());
-    std::printf("\n%s%s%s%s%s%s%s%s", SystematicLine(*report).c_str(),
+    std::printf("\n%s%s%s%s%s%s%s%s%s", SystematicLine(*report).c_str(),
                 Notes("input", found).c_str(), MotionLine(*recording, *tracking).c_str(),
                 StartLine(report->start).c_str(), QualityLine(*report, attitudes).c_str(),
+                HalvesLine(report->halves_chi2).c_str(),
                 TimeLine(report->times, tracking->seconds, recording->frames.size()).c_str(),
                 Notes("note", report->notes).c_str(), Notes("doubt", report->doubts).c_str());
     std::printf("written    %s/calibration.yaml, report.html, trace.csv, delay.csv%s\n",

@@ -85,7 +85,7 @@ Status RunDiagnose(const std::vector<std::string>& arguments) {
   }
   std::printf("%s", DiagnosisText(diagnosis, attitudes).c_str());
   if (!FLAGS_quiet && diagnosis.before) {
-    std::printf("%s%s",
+    std::printf("%s%s%s", HalvesLine(diagnosis.result().halves_chi2).c_str(),
                 TimeLine(diagnosis.times, run->tracking.seconds, recording->frames.size()).c_str(),
                 Notes("doubt", diagnosis.result().doubts).c_str());
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/format.h"
+#include "estimator/halves.h"
 #include "estimator/start/axis_permutation.h"
 #include "tools/report/parameter_rows.h"
 
@@ -157,6 +158,11 @@ std::string QualityLine(const CalibrationReport& report, bool attitudes) {
   if (quality.rms_px > 0.0) line += Format(", rms %.3f px", quality.rms_px);
   if (report.unseen) line += Format(", on unseen frames %.3f px", report.unseen->rms_px);
   return line + "\n";
+}
+
+std::string HalvesLine(double chi2) {
+  if (!(chi2 > 0.0) || chi2 > kHalvesLimit) return "";
+  return Format("halves     of the recording agree: chi2 per parameter %.2f, 1 expected\n", chi2);
 }
 
 std::string TimeLine(const std::vector<StageTime>& times, double tracking_s, size_t frames) {

@@ -31,6 +31,10 @@ std::string StartLine(const StartResult& start);
 // Residuals, inliers, unseen frames.
 std::string QualityLine(const CalibrationReport& report, bool attitudes);
 
+// That the two halves of the recording agree, by `chi2` per parameter (CalibrationReport::
+// halves_chi2). Empty where it is too short to tell, and where they do not: a doubt says that.
+std::string HalvesLine(double chi2);
+
 // Seconds per stage, and per frame of the online pass.
 std::string TimeLine(const std::vector<StageTime>& times, double tracking_s, size_t frames);
 

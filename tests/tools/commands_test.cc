@@ -97,8 +97,10 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
   Simulate(kHandheldScenario, "a");
   const RunResult run = Run("calibrate a --out=result --threads=1");
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("focal length"), HasSubstr("readout time"), HasSubstr("±"),
-                             HasSubstr("unseen"), HasSubstr("written    result/calibration.yaml")));
+  EXPECT_THAT(run.out,
+              AllOf(HasSubstr("focal length"), HasSubstr("readout time"), HasSubstr("±"),
+                    HasSubstr("unseen"), HasSubstr("halves     of the recording agree: chi2"),
+                    HasSubstr("written    result/calibration.yaml")));
   EXPECT_EQ(run.err, "");  // no progress bar: not a terminal
 
   const YAML::Node result = YAML::LoadFile(Path("result/calibration.yaml"));
@@ -118,8 +120,8 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
   EXPECT_NEAR(std::sqrt(covariance[kStateDelay][kStateDelay]),
               result["clock"]["delay_s"]["sigma"].as<double>(), 1e-12);
   EXPECT_NEAR(result["quality"]["noise_px"].as<double>(), 0.2, 0.03);
-  for (const char* key :
-       {"pairs", "matches", "inlier_ratio", "rms_px", "unseen_rms_px", "unobservable"}) {
+  for (const char* key : {"pairs", "matches", "inlier_ratio", "rms_px", "unseen_rms_px",
+                          "halves_chi2", "unobservable"}) {
     EXPECT_TRUE(result["quality"][key]) << key;
   }
   EXPECT_THAT(ReadFile(Path("result/trace.csv")),

@@ -332,7 +332,7 @@ ReportSection FitSection(const CalibrationReport& report, bool attitudes) {
   if (report.halves_chi2 > 0.0) {
     noise.rows.push_back(
         {{"disagreement of the two halves, chi2 per parameter (1 expected)", "", 0.0},
-         {Format("%.2f", report.halves_chi2), "", 0.0}});
+         {Format("%.2f", report.halves_chi2), "quality.halves_chi2", report.halves_chi2}});
   }
   std::string html = (table.rows.empty() ? "" : TableHtml(table)) + TableHtml(noise);
   html += Paragraph(
