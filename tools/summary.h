@@ -32,7 +32,8 @@ std::string StartLine(const StartResult& start);
 std::string QualityLine(const CalibrationReport& report, bool attitudes);
 
 // That the two halves of the recording agree, by `chi2` per parameter (CalibrationReport::
-// halves_chi2). Empty where it is too short to tell, and where they do not: a doubt says that.
+// halves_chi2). Empty where the recording is too short to tell, and where they
+// do not agree: a doubt says that.
 std::string HalvesLine(double chi2);
 
 // Seconds per stage, and per frame of the online pass.
