@@ -66,7 +66,11 @@ double SimulatedCamera::Focal(double time_s) const {
 // The lens group moves against the rotation: a turn by +theta_y moves the picture by -f theta_y in
 // u, a turn by +theta_x by +f theta_x in v.
 Vector2d SimulatedCamera::StabiliserShift(double time_s) const {
-  if (high_passed_.empty()) return Vector2d::Zero();
+  Vector2d logged_px = Vector2d::Zero();
+  if (const double scale = scenario_.effects.optical_stabilisation.logged_px; scale != 0.0) {
+    logged_px = scale * scenario_.log->LensShiftAt(time_s);
+  }
+  if (high_passed_.empty()) return logged_px;
   const double position = std::clamp((time_s - kHighPassStart) / kHighPassStep, 0.0,
                                      static_cast<double>(high_passed_.size()) - 2.0);
   const auto index = static_cast<size_t>(position);
@@ -76,7 +80,7 @@ Vector2d SimulatedCamera::StabiliserShift(double time_s) const {
       (1.0 - u) * (1.0 - u) * ((1.0 + 2.0 * u) * a.angle_rad + u * kHighPassStep * a.rate_rad_s) +
       u * u * ((3.0 - 2.0 * u) * b.angle_rad - (1.0 - u) * kHighPassStep * b.rate_rad_s);
   const double shift_px = scenario_.effects.optical_stabilisation.gain * lens_[kFocal];
-  return {shift_px * lens_[kAspect] * angle.y(), -shift_px * angle.x()};
+  return logged_px + Vector2d(shift_px * lens_[kAspect] * angle.y(), -shift_px * angle.x());
 }
 
 LensParameters SimulatedCamera::LensAt(double time_s) const {

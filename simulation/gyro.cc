@@ -138,6 +138,25 @@ Vector3d SpecificForce(const Scenario& scenario, const Trajectory& trajectory, d
          alpha.cross(arm) - omega.cross(omega.cross(arm));
 }
 
+// When samples are taken.
+std::vector<int64_t> SampleStamps(const Scenario& scenario) {
+  std::vector<int64_t> stamps_ns;
+  if (scenario.log != nullptr) {
+    for (const int64_t time_ns : scenario.log->gyro_ns) {
+      stamps_ns.push_back(scenario.start_ns + time_ns);
+    }
+    return stamps_ns;
+  }
+  const double rate_hz = scenario.gyro.rate_hz, dt = 1.0 / rate_hz;
+  const auto count =
+      static_cast<int64_t>(std::floor((scenario.duration_s + 2.0 * scenario.margin_s) * rate_hz)) +
+      1;
+  for (int64_t i = 0; i < count; ++i) {
+    stamps_ns.push_back(StampAt(scenario.start_ns, static_cast<double>(i) * dt));
+  }
+  return stamps_ns;
+}
+
 }  // namespace
 
 SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajectory,
@@ -145,9 +164,8 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
   const GyroOptions& options = scenario.gyro;
   const Effects& effects = scenario.effects;
   const double dt = 1.0 / options.rate_hz;
-  const auto count = static_cast<int64_t>(std::floor(
-                         (scenario.duration_s + 2.0 * scenario.margin_s) * options.rate_hz)) +
-                     1;
+  const std::vector<int64_t> stamps_ns = SampleStamps(scenario);
+  const size_t count = stamps_ns.size();
 
   Matrix3d M = Matrix3d::Identity();
   effects.ForEach([&](const auto& effect) { CallAddRateMatrix(effect, &M, 0); });
@@ -162,11 +180,12 @@ SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajector
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   SimulatedGyro result;
   Vector3d walk = Vector3d::Zero();
-  for (int64_t i = 0; i < count; ++i) {
-    const int64_t sampled_ns = StampAt(scenario.start_ns, static_cast<double>(i) * dt);
+  for (size_t i = 0; i < count; ++i) {
+    const int64_t sampled_ns = stamps_ns[i];
     const double time_s = SecondsSince(scenario.start_ns, sampled_ns);
     Vector3d bias = options.bias_rad_s + walk;
     effects.ForEach([&](const auto& effect) { CallAddBias(effect, time_s, &bias, 0); });
+    result.times_s.push_back(time_s);
     result.bias_rad_s.push_back(bias);
     walk += sigma_walk * normal.Vector();
 

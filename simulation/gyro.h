@@ -15,11 +15,12 @@ namespace camgyro::simulation {
 struct SimulatedGyro {
   std::vector<GyroSample> gyro;
   std::vector<AccelSample> accel;
-  // Bias with its walk and drift at i / rate_hz, for every sample before any is dropped [rad/s].
+  // Bias with its walk and drift, for every sample before any is dropped [rad/s], and when [s].
+  std::vector<double> times_s;
   std::vector<Eigen::Vector3d> bias_rad_s;
 };
 
-// Samples from 0 to duration + 2 margins.
+// Samples from 0 to duration + 2 margins, or as the log has them.
 //   w = Clip( (I + diag(scale) + S) LowPass(w_true) + b + noise ), then rounded to the quantum
 SimulatedGyro SimulateGyro(const Scenario& scenario, const Trajectory& trajectory,
                            std::mt19937_64* random);

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "simulation/yaml_section.h"
 
@@ -142,6 +143,13 @@ void Read(YamlSection section, VideoOptions* video) {
   section.Finish();
 }
 
+void Read(YamlSection section, DeviceLogFiles* files) {
+  section.Read("gyro", &files->gyro);
+  section.Read("frames", &files->frames);
+  section.Read("lens_shift", &files->lens_shift);
+  section.Finish();
+}
+
 void Read(YamlSection section, Effects* effects) {
   effects->ForEach([&](auto& effect) {
     YamlSection keys = section.Child(effect.kName);
@@ -180,7 +188,46 @@ std::string CheckTogether(const Scenario& scenario) {
   if (scenario.motion.kind == MotionKind::kFile && scenario.motion.file.empty()) {
     return "motion.file: is missing for motion.kind file";
   }
+  const DeviceLogFiles& log = scenario.log_files;
+  if (log.gyro.empty() && !(log.frames.empty() && log.lens_shift.empty())) {
+    return "log.gyro: is missing; the times of a log are after its first gyro sample";
+  }
+  if (!log.gyro.empty() && scenario.motion.kind == MotionKind::kFile) {
+    return "log.gyro: says how the camera turns, as motion.kind file does; leave one of them out";
+  }
+  if (scenario.effects.optical_stabilisation.logged_px != 0.0 && log.lens_shift.empty()) {
+    return "log.lens_shift: is missing for optical_stabilisation.logged_px";
+  }
   return "";
+}
+
+void MakeRelativeTo(const std::filesystem::path& folder, std::string* file) {
+  const std::filesystem::path path(*file);
+  if (!path.empty() && path.is_relative()) *file = (folder / path).string();
+}
+
+double MedianInterval(const std::vector<int64_t>& times_ns) {
+  std::vector<double> intervals_s;
+  for (size_t i = 1; i < times_ns.size(); ++i) {
+    intervals_s.push_back(1e-9 * static_cast<double>(times_ns[i] - times_ns[i - 1]));
+  }
+  return MedianInPlace(&intervals_s);
+}
+
+// The log of a scenario, and what it says of the scenario's length and rates.
+Status TakeLog(Scenario* scenario) {
+  if (scenario->log_files.gyro.empty()) return {};
+  Result<DeviceLog> log = ReadDeviceLog(scenario->log_files);
+  if (!log) return tl::unexpected(log.error());
+  const double span_s = 1e-9 * static_cast<double>(log->gyro_ns.back());
+  scenario->duration_s = span_s - 2.0 * scenario->margin_s;
+  if (!(scenario->duration_s > 0.0)) {
+    return BadInput(scenario->log_files.gyro + ": is shorter than twice margin_s");
+  }
+  scenario->gyro.rate_hz = 1.0 / MedianInterval(log->gyro_ns);
+  if (!log->frame_ns.empty()) scenario->camera.rate_hz = 1.0 / MedianInterval(log->frame_ns);
+  scenario->log = std::make_shared<const DeviceLog>(*std::move(log));
+  return {};
 }
 
 // Applies "a.b=value" to the tree. Returns a complaint or nothing.
@@ -280,6 +327,7 @@ Result<Scenario> ParseScenario(const std::string& yaml, const std::vector<std::s
     Read(file.Child("tracks"), &scenario.tracks);
     Read(file.Child("video"), &scenario.video);
     Read(file.Child("effects"), &scenario.effects);
+    Read(file.Child("log"), &scenario.log_files);
     file.Finish();
   } catch (const YAML::Exception& error) {
     complaint = "line " + std::to_string(error.mark.line + 1) + ": " + error.msg;
@@ -300,10 +348,12 @@ Result<Scenario> LoadScenario(const std::string& path, const std::vector<std::st
     error.message = path + ": " + error.message;
     return tl::unexpected(error);
   }
-  const std::filesystem::path trajectory(scenario->motion.file);
-  if (!trajectory.empty() && trajectory.is_relative()) {
-    scenario->motion.file = (std::filesystem::path(path).parent_path() / trajectory).string();
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  DeviceLogFiles& log = scenario->log_files;
+  for (std::string* name : {&scenario->motion.file, &log.gyro, &log.frames, &log.lens_shift}) {
+    MakeRelativeTo(folder, name);
   }
+  if (const Status taken = TakeLog(&*scenario); !taken) return tl::unexpected(taken.error());
   return scenario;
 }
 

@@ -5,11 +5,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/result.h"
+#include "simulation/device_log.h"
 #include "simulation/effects/all_effects.h"
 
 namespace camgyro::simulation {
@@ -144,12 +146,18 @@ struct Scenario {
   TrackOptions tracks;
   VideoOptions video;
   Effects effects;
+  // A device's own log. With one, the camera turns as its gyro did (the translation is that of
+  // `motion`), samples are taken at its stamps, and pictures, if it has any, at theirs;
+  // LoadScenario sets duration and rates to the log's.
+  DeviceLogFiles log_files;
+  std::shared_ptr<const DeviceLog> log;
 };
 
 // Reads a scenario file. Overrides are "section.key=value" with a YAML value and win over the file.
 // What the file does not name keeps its default; motion.kind first sets the preset of its kind. An
 // unknown key, a wrong type or a value out of its range is an error that names line and key, and
-// the nearest known key. Relative file names are relative to the scenario file.
+// the nearest known key. LoadScenario also reads the log, of which ParseScenario takes the names.
+// Relative file names are relative to the scenario file.
 Result<Scenario> LoadScenario(const std::string& path,
                               const std::vector<std::string>& overrides = {});
 Result<Scenario> ParseScenario(const std::string& yaml,

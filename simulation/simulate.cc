@@ -235,6 +235,39 @@ class Tracker {
   int64_t next_id_ = 0;
 };
 
+struct PlannedFrame {
+  int64_t stamp_ns;  // without jitter
+  double exposure_s;
+};
+
+// The frames of a scenario, or those of its log that the gyro covers with the scenario's margin.
+std::vector<PlannedFrame> PlanFrames(const Scenario& scenario) {
+  const CameraOptions& options = scenario.camera;
+  std::vector<PlannedFrame> plan;
+  const auto add = [&](double time_s, int64_t stamp_ns) {
+    const double swing = options.exposure_swing * std::sin(2.0 * M_PI * time_s / 5.0);
+    const int64_t exposure_ns = std::llround(1e9 * options.exposure_s * (1.0 + swing));
+    plan.push_back({stamp_ns, 1e-9 * static_cast<double>(exposure_ns)});
+  };
+  if (scenario.log != nullptr && !scenario.log->frame_ns.empty()) {
+    const DeviceLog& log = *scenario.log;
+    for (size_t i = 0; i < log.frame_ns.size(); ++i) {
+      const double time_s = 1e-9 * static_cast<double>(log.frame_ns[i]) + options.delay_s;
+      const double last_s = scenario.margin_s + scenario.duration_s;
+      if (time_s < scenario.margin_s || time_s > last_s) continue;
+      add(time_s, scenario.start_ns + log.frame_ns[i]);
+      if (!log.exposure_s.empty()) plan.back().exposure_s = log.exposure_s[i];
+    }
+    return plan;
+  }
+  const int count = static_cast<int>(std::floor(scenario.duration_s * options.rate_hz)) + 1;
+  for (int i = 0; i < count; ++i) {
+    const double time_s = scenario.margin_s + i / options.rate_hz;  // first row, clean clock
+    add(time_s, StampAt(scenario.start_ns, time_s - options.delay_s));
+  }
+  return plan;
+}
+
 void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated* result) {
   const CameraOptions& options = scenario.camera;
   std::mt19937_64 random = MakeRandom(scenario.seed, kFrameStream);
@@ -243,13 +276,10 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
   std::exponential_distribution<double> latency;
   const FrameStampJitter& jitter = scenario.effects.frame_stamp_jitter;
   Wander wander(scenario, jitter.wander_time_s, kWanderStream);
-  const int count = static_cast<int>(std::floor(scenario.duration_s * options.rate_hz)) + 1;
-  for (int i = 0; i < count; ++i) {
-    const double time_s = scenario.margin_s + i / options.rate_hz;  // first row, clean clock
-    const int64_t stamp_ns = StampAt(scenario.start_ns, time_s - options.delay_s);
-    const double swing = options.exposure_swing * std::sin(2.0 * M_PI * time_s / 5.0);
-    const int64_t exposure_ns = std::llround(1e9 * options.exposure_s * (1.0 + swing));
-    const double exposure_s = 1e-9 * static_cast<double>(exposure_ns);
+  const std::vector<PlannedFrame> plan = PlanFrames(scenario);
+  const size_t count = plan.size();
+  for (size_t i = 0; i < count; ++i) {
+    const auto [stamp_ns, exposure_s] = plan[i];
     const double late_s = jitter.latency_s > 0.0 ? jitter.latency_s * latency(random) : 0.0;
     const int64_t jitter_ns = std::llround(
         1e9 * (jitter.spread_s * normal(random) + late_s + jitter.wander_s * wander.Next()));
@@ -267,9 +297,10 @@ void AddFrames(const Scenario& scenario, const SimulatedGyro& sensors, Simulated
         result->camera->Delay(truth.timing) - 1e-9 * static_cast<double>(frame.stamp_ns - stamp_ns);
     const double first_row_s = result->camera->ExposureTime(truth.timing, {0.0, 0.0});
     truth.focal_px = result->camera->Focal(first_row_s);
-    const double position = std::clamp(first_row_s * scenario.gyro.rate_hz, 0.0,
-                                       static_cast<double>(sensors.bias_rad_s.size()) - 1.0);
-    truth.bias_gyro_rad_s = sensors.bias_rad_s[static_cast<size_t>(position)];
+    const auto later =
+        std::upper_bound(sensors.times_s.begin() + 1, sensors.times_s.end(), first_row_s);
+    truth.bias_gyro_rad_s =
+        sensors.bias_rad_s[static_cast<size_t>(later - sensors.times_s.begin()) - 1];
     truth.state = result->camera->trajectory().At(first_row_s);
     result->recording.frames.push_back(frame);
     result->frames.push_back(truth);

@@ -140,6 +140,25 @@ class WaveTrajectory final : public Trajectory {
   double speed_m_s_, radius_m_;
 };
 
+// Moves as one trajectory and turns as another.
+class TurnedTrajectory final : public Trajectory {
+ public:
+  TurnedTrajectory(std::shared_ptr<const Trajectory> path, std::shared_ptr<const Trajectory> turns)
+      : path_(std::move(path)), turns_(std::move(turns)) {}
+
+  CameraState At(double time_s) const override {
+    CameraState state = path_->At(time_s);
+    const CameraState turned = turns_->At(time_s);
+    state.R_world_cam = turned.R_world_cam;
+    state.omega_cam_rad_s = turned.omega_cam_rad_s;
+    state.alpha_cam_rad_s2 = turned.alpha_cam_rad_s2;
+    return state;
+  }
+
+ private:
+  const std::shared_ptr<const Trajectory> path_, turns_;
+};
+
 }  // namespace
 
 Result<std::shared_ptr<const Trajectory>> MakeTrajectory(const Scenario& scenario,
@@ -152,8 +171,11 @@ Result<std::shared_ptr<const Trajectory>> MakeTrajectory(const Scenario& scenari
     }
     return ReadTrajectory(scenario.motion.file, scenario.motion.file_knot_s, T_pose_cam);
   }
-  return std::make_shared<WaveTrajectory>(
+  auto waves = std::make_shared<WaveTrajectory>(
       scenario.motion, scenario.effects.translation_acceleration.shake_m_s, random);
+  if (scenario.log == nullptr) return waves;
+  return std::make_shared<TurnedTrajectory>(std::move(waves),
+                                            TurnsOfLog(*scenario.log, scenario.mount.q_gyro_cam));
 }
 
 }  // namespace camgyro::simulation

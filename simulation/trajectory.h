@@ -42,6 +42,11 @@ Result<std::shared_ptr<const Trajectory>> MakeTrajectory(const Scenario& scenari
 Result<std::shared_ptr<const Trajectory>> ReadTrajectory(const std::string& path, double knot_s,
                                                          const Eigen::Isometry3d& T_pose_cam);
 
+// Turns as the gyro of a log did, whose rates are taken as they are, and does not move; level at
+// first. The same spline, with knots every two of its intervals.
+std::shared_ptr<const Trajectory> TurnsOfLog(const DeviceLog& log,
+                                             const Eigen::Quaterniond& q_gyro_cam);
+
 }  // namespace camgyro::simulation
 
 #endif  // CAMGYRO_SIMULATION_TRAJECTORY_H_

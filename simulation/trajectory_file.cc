@@ -76,6 +76,18 @@ Eigen::Isometry3d Interpolate(const StampedPose& a, const StampedPose& b, double
   return pose;
 }
 
+// The poses at the knots of a spline.
+std::vector<Eigen::Isometry3d> KnotsOf(const std::vector<StampedPose>& poses, double knot_s) {
+  std::vector<Eigen::Isometry3d> knots;
+  size_t next = 1;
+  for (int i = -1; i * knot_s <= poses.back().time_s; ++i) {
+    const double time_s = std::max(0.0, i * knot_s);
+    while (poses[next].time_s < time_s) ++next;
+    knots.push_back(Interpolate(poses[next - 1], poses[next], time_s));
+  }
+  return knots;
+}
+
 }  // namespace
 
 Result<std::shared_ptr<const Trajectory>> ReadTrajectory(const std::string& path, double knot_s,
@@ -119,17 +131,31 @@ Result<std::shared_ptr<const Trajectory>> ReadTrajectory(const std::string& path
                     " s");
   }
 
-  std::vector<Eigen::Isometry3d> knots;
-  size_t next = 1;
-  for (int i = -1; i * knot_s <= poses.back().time_s; ++i) {
-    const double time_s = std::max(0.0, i * knot_s);
-    while (poses[next].time_s < time_s) ++next;
-    knots.push_back(Interpolate(poses[next - 1], poses[next], time_s));
-  }
+  std::vector<Eigen::Isometry3d> knots = KnotsOf(poses, knot_s);
   // The world's origin is the start, as for the other motions.
   const Vector3d start = knots.front().translation();
   for (Eigen::Isometry3d& knot : knots) knot.translation() -= start;
   return std::make_shared<SplineTrajectory>(std::move(knots), knot_s);
+}
+
+std::shared_ptr<const Trajectory> TurnsOfLog(const DeviceLog& log,
+                                             const Eigen::Quaterniond& q_gyro_cam) {
+  std::vector<StampedPose> poses;
+  Eigen::Quaterniond q_world_gyro = q_gyro_cam.conjugate();  // the camera is level
+  for (size_t i = 0; i < log.gyro_ns.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    const double time_s = 1e-9 * static_cast<double>(log.gyro_ns[i]);
+    if (i > 0) {
+      const Vector3d mean =
+          0.5 * (log.rate_gyro_rad_s.col(column - 1) + log.rate_gyro_rad_s.col(column));
+      const Vector3d turn = (time_s - poses.back().time_s) * mean;
+      q_world_gyro = (q_world_gyro * Exp(turn)).normalized();
+    }
+    poses.push_back({time_s, Eigen::Isometry3d(q_world_gyro * q_gyro_cam)});
+  }
+  const double interval_s = poses.back().time_s / static_cast<double>(poses.size() - 1);
+  const double knot_s = 2.0 * interval_s;
+  return std::make_shared<SplineTrajectory>(KnotsOf(poses, knot_s), knot_s);
 }
 
 }  // namespace camgyro::simulation

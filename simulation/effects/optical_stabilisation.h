@@ -10,14 +10,18 @@ struct OpticalStabilisation {
   static constexpr char kName[] = "optical_stabilisation";
   double gain = 0.0;  // 1: the whole high-passed rotation is taken out
   double corner_hz = 0.5;
+  double logged_px = 0.0;  // px of the picture per unit of the scenario's log of the lens
 
   template <typename Section>
   void Read(Section* section) {
     section->Read("gain", &gain);
     section->Read("corner_hz", &corner_hz, Range::kPositive);
+    section->Read("logged_px", &logged_px);
   }
-  bool active() const { return gain != 0.0; }
-  TruthParameters Truth() const { return {{"gain", "1", gain}, {"corner", "Hz", corner_hz}}; }
+  bool active() const { return gain != 0.0 || logged_px != 0.0; }
+  TruthParameters Truth() const {
+    return {{"gain", "1", gain}, {"corner", "Hz", corner_hz}, {"logged", "px", logged_px}};
+  }
 };
 
 }  // namespace camgyro::simulation
