@@ -35,16 +35,19 @@ constexpr char kEffects[] = "clock_skew";
 
 // A fit of all that was collected, with the distortion of a lens that nothing declares where it
 // leads fits astray: a window without it runs to any focal length. Nothing where the fit leads
-// nowhere.
-std::optional<Calibration> FitCollected(const Recording& recording,
-                                        const CameraRotationsAt& rotations_at,
-                                        const StartResult& start, const Calibration& from) {
+// nowhere. Errors: a stabilised lens, which the window would have to know at every sample to come.
+Result<std::optional<Calibration>> FitCollected(const Recording& recording,
+                                                const CameraRotationsAt& rotations_at,
+                                                const StartResult& start, const Calibration& from) {
   CalibrateOptions options;
   options.effects = kEffects;
   options.given_start = start;
   options.times_between = false;
   Result<CalibrationReport> fit = CalibrateRecording(recording, rotations_at, options);
   if (!fit || !fit->converged) return std::nullopt;
+  if (LensFollowsTurns(fit->calibration)) {
+    return CannotEstimate("the lens moves as the camera turns: switch its stabilisation off");
+  }
   const double focal_px = fit->calibration.lens[kFocal];
   if (RanAway(focal_px, from.lens[kFocal]) || IsFarFromRotations(focal_px, fit->start.focal)) {
     return std::nullopt;
@@ -156,9 +159,9 @@ Status OnlineCalibration::TryStart() {
 
   Result<StartingPoint> point = MakeStartingPoint(recording, *start, kEffects, ByPlane());
   if (!point) return tl::unexpected(point.error());
-  if (auto fit = FitCollected(recording, rotations_at, *start, point->estimate)) {
-    point->estimate = *std::move(fit);
-  }
+  auto fit = FitCollected(recording, rotations_at, *start, point->estimate);
+  if (!fit) return tl::unexpected(fit.error());
+  if (*fit) point->estimate = **std::move(fit);
   progress_.prior_sigma = point->prior.sigma;
   SlidingWindowOptions window_options = WindowOptionsFor(selection);
   window_options.graph = GraphOptionsFor(recording, *start, window_options.graph);

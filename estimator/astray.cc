@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
+#include "core/parallel.h"
 #include "core/standard_distortion.h"
 #include "estimator/start/focal_scan.h"
+#include "estimator/window/pair_selection.h"
 
 namespace camgyro {
 namespace {
@@ -20,6 +24,10 @@ constexpr double kStillRunning = 0.1;
 // How far the focal length of a fit may be from that of the rotations at the start (log), and in
 // sigmas of the latter.
 constexpr double kFarFromStart = 0.2, kFarFromStartSigmas = 5.0;
+
+// Noise with an effect over that without it, at which the effect explains what led a fit astray: a
+// tenth of the variance.
+constexpr double kExplained = 0.32;
 
 // Sigmas beyond which a fit bears out an effect that nobody has asked for.
 constexpr double kSeenSigmas = 3.0;
@@ -43,9 +51,23 @@ bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start)
            std::max(kFarFromStart, kFarFromStartSigmas * start->sigma_px / start->value_px));
 }
 
+bool LensFollowsTurns(const Calibration& calibration) {
+  if (calibration.effects == nullptr) return false;
+  const auto& items = calibration.effects->items();
+  return std::any_of(items.begin(), items.end(), [](const EffectSet::Item& item) {
+    return item.entry->part == ModelPart::kLens && item.effect->depends_on_calibration();
+  });
+}
+
+double NoiseOverSmooth(const Recording& recording, double noise_px) {
+  if (recording.HasOnlyAttitudes() || !recording.matches.empty()) return 0.0;
+  return noise_px / NoiseOfSmoothMotion(recording, SelectPairs(recording));
+}
+
 void LookThroughFittedLens(const Recording& recording, const CalibrateOptions& options,
                            const CameraRotationsAt& rotations_at, CalibrationReport* report) {
   const Calibration& c = report->calibration;
+  if (LensFollowsTurns(c) && report->start.focal) report->start.focal->determined = false;
   const LensParameters lens = c.FullLens();
   if (recording.HasOnlyAttitudes() || !rotations_at || lens == c.lens ||
       !IsFarFromRotations(c.lens[kFocal], report->start.focal)) {
@@ -84,15 +106,6 @@ bool IsSeen(const EffectSet::Item& item, const Calibration& fit) {
       .any();
 }
 
-std::vector<std::pair<const EffectEntry*, std::string>> WhatLeadsAstray(const EffectSetup& setup) {
-  std::vector<std::pair<const EffectEntry*, std::string>> all;
-  for (const EffectEntry& entry : EffectCatalogue()) {
-    if (!entry.leads_astray) continue;
-    for (const std::string& shape : entry.shapes(setup)) all.emplace_back(&entry, shape);
-  }
-  return all;
-}
-
 bool IsBornOut(const CalibrationReport& fit, const std::string& effect, double begin_focal_px,
                double noise_px) {
   const Calibration& c = fit.calibration;
@@ -109,6 +122,36 @@ bool IsBornOut(const CalibrationReport& fit, const std::string& effect, double b
 
 double UnseenRms(const CalibrationReport& fit) {
   return fit.unseen ? fit.unseen->rms_px : fit.quality.rms_px;
+}
+
+std::optional<CalibrationReport> FitWithWhatLeadsAstray(
+    const Recording& recording, const Calibration& from, double noise_px,
+    const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with,
+    const EffectEntry** added) {
+  constexpr size_t kTogether = 2;  // whatever the number of threads: a fixed order of trials
+  std::optional<CalibrationReport> best;
+  const EffectSetup setup = MakeEffectSetup(recording, from);
+  for (const EffectEntry& entry : EffectCatalogue()) {
+    if (!entry.leads_astray || (from.effects != nullptr && from.effects->Has(entry.name))) continue;
+    const double enough_px = noise_px * kExplained;
+    std::vector<std::string> shapes = entry.shapes(setup);
+    std::reverse(shapes.begin(), shapes.end());
+    for (size_t begin = 0; begin < shapes.size(); begin += kTogether) {
+      std::vector<Result<CalibrationReport>> fits(std::min(kTogether, shapes.size() - begin));
+      ParallelFor(fits.size(),
+                  [&](size_t i) { fits[i] = fit_with(entry.name + ":" + shapes[begin + i]); });
+      for (Result<CalibrationReport>& fit : fits) {
+        if (!fit || !IsBornOut(*fit, entry.name, from.lens[kFocal], noise_px)) continue;
+        if (best && !(UnseenRms(*fit) < UnseenRms(*best))) continue;
+        best = *std::move(fit);
+        *added = &entry;
+      }
+      if (best && *added == &entry && best->quality.noise_px < enough_px) break;
+    }
+    const double left_px = best ? best->quality.noise_px : noise_px;
+    if (NoiseOverSmooth(recording, left_px) <= kNoiseOfAstray) break;
+  }
+  return best;
 }
 
 }  // namespace camgyro

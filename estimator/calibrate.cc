@@ -68,11 +68,13 @@ class CalibrationJob {
     // Delay and bias come from rates; the rest needs a fit that has settled, at a lens like the
     // start's.
     const double focal_px = report_.calibration.lens[kFocal];
+    const bool pulled = NoiseOverSmooth(recording_, report_.quality.noise_px) > kNoiseOfAstray;
     const bool ran_away =
         !report_.calibration.determined[kStateFocal] && RanAway(focal_px, from_start_.lens[kFocal]);
     if (ran_away || !report_.converged || IsFarFromRotations(focal_px, report_.start.focal)) {
       DisbelieveFit(ran_away, &report_);
     }
+    if (pulled) report_.calibration.determined.fill(false);
     AddDoubts(recording_, &report_);
     Tell("refinement", 1.0);
     return std::move(report_);
@@ -167,8 +169,7 @@ class CalibrationJob {
                                        RanAway(fit.lens[kFocal], from_start_.lens[kFocal]));
   }
   bool NoiseIsAstray(double noise_px) const {
-    return MayTryWhatLeadsAstray() && recording_.matches.empty() &&
-           noise_px > kNoiseOfAstray * NoiseOfSmoothMotion(recording_, SelectPairs(recording_));
+    return MayTryWhatLeadsAstray() && NoiseOverSmooth(recording_, noise_px) > kNoiseOfAstray;
   }
 
   // The calibration with an effect that leads fits astray and that the data bear out: of its
@@ -177,24 +178,19 @@ class CalibrationJob {
   std::optional<CalibrationReport> TryWhatLeadsAstray(const CameraRotationsAt& rotations_at,
                                                       const Calibration& astray, double noise_px) {
     tried_what_leads_astray_ = true;
+    if (!report_.residual->facts().with_effects) return std::nullopt;
     const double begin_px = from_start_.lens[kFocal];
-    std::optional<CalibrationReport> best;
     const EffectEntry* added = nullptr;
-    for (const auto& [entry, shape] : WhatLeadsAstray(MakeEffectSetup(recording_, from_start_))) {
-      if (!report_.residual->facts().with_effects ||
-          (from_start_.effects != nullptr && from_start_.effects->Has(entry->name))) {
-        continue;
-      }
-      CalibrateOptions with = options_;
-      with.effects += (with.effects.empty() ? "" : ",") + entry->name + ":" + shape;
-      with.given_start = report_.start;
-      with.try_what_leads_astray = false;
-      Result<CalibrationReport> fit = CalibrationJob(recording_, with, progress_).Run(rotations_at);
-      if (!fit || !IsBornOut(*fit, entry->name, begin_px, noise_px)) continue;
-      if (best && !(UnseenRms(*fit) < UnseenRms(*best))) continue;
-      best = *std::move(fit);
-      added = entry;
-    }
+    std::optional<CalibrationReport> best = FitWithWhatLeadsAstray(
+        recording_, from_start_, noise_px,
+        [&](const std::string& effect) {
+          CalibrateOptions with = options_;
+          with.effects += (with.effects.empty() ? "" : ",") + effect;
+          with.given_start = report_.start;
+          with.try_what_leads_astray = false;
+          return CalibrationJob(recording_, with, nullptr).Run(rotations_at);
+        },
+        &added);
     if (!best) return best;
     best->notes.push_back(Format(
         "%s is fitted as well, although nobody asked for it: without it the focal length was %.0f "

@@ -74,6 +74,15 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
         "row",
         c.lens[kFocal], 1e3 * report->start.delay_middle_row_s));
   }
+  const double noise_px = report->quality.noise_px;
+  const double over_smooth = NoiseOverSmooth(recording, noise_px);
+  if (over_smooth > kNoiseOfAstray) {
+    report->doubts.push_back(Format(
+        "the fit leaves %.2f px, where the points move smoothly to within %.2f px: something moves "
+        "the whole picture that the model lacks, and pulls every value by more than its sigma; "
+        "was the picture stabilised?",
+        noise_px, noise_px / over_smooth));
+  }
   if (IsFarFromRotations(c.lens[kFocal], report->start.focal)) {
     report->doubts.push_back(Format(
         "the focal length of the fit, %.0f px, is far from the %.0f ± %.0f px of the rotations at "

@@ -51,6 +51,9 @@ SimulatedCamera::SimulatedCamera(const Scenario& scenario,
       const Vector2d middle = trajectory_->At(t + 0.5 * h).omega_cam_rad_s.head<2>();
       const Vector2d next = trajectory_->At(t + h).omega_cam_rad_s.head<2>();
       angle = whole * angle + h / 6.0 * (whole * omega + 4.0 * half * middle + next);
+      // At its stop the lens waits for the camera to turn back.
+      const double travel_rad = effects.optical_stabilisation.travel_rad;
+      if (travel_rad > 0.0 && angle.norm() > travel_rad) angle *= travel_rad / angle.norm();
       omega = next;
     }
   }

@@ -10,17 +10,22 @@ struct OpticalStabilisation {
   static constexpr char kName[] = "optical_stabilisation";
   double gain = 0.0;  // 1: the whole high-passed rotation is taken out
   double corner_hz = 0.5;
-  double logged_px = 0.0;  // px of the picture per unit of the scenario's log of the lens
+  double travel_rad = 0.0;  // the angle in any direction at which the lens is at its stop; 0: none
+  double logged_px = 0.0;   // px of the picture per unit of the scenario's log of the lens
 
   template <typename Section>
   void Read(Section* section) {
     section->Read("gain", &gain);
     section->Read("corner_hz", &corner_hz, Range::kPositive);
+    section->Read("travel_rad", &travel_rad, Range::kNotNegative);
     section->Read("logged_px", &logged_px);
   }
   bool active() const { return gain != 0.0 || logged_px != 0.0; }
   TruthParameters Truth() const {
-    return {{"gain", "1", gain}, {"corner", "Hz", corner_hz}, {"logged", "px", logged_px}};
+    return {{"gain", "1", gain},
+            {"corner", "Hz", corner_hz},
+            {"travel", "rad", travel_rad},
+            {"logged", "px", logged_px}};
   }
 };
 

@@ -17,6 +17,7 @@ namespace camgyro {
 namespace {
 
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -93,6 +94,50 @@ TEST(Astray, RotationsAreSeenThroughTheFittedLens) {
   ASSERT_TRUE(report.start.focal->determined);
   EXPECT_NEAR(report.start.focal->value_px, 458.0, 0.1 * 458.0);
   EXPECT_FALSE(IsFarFromRotations(s.truth.lens[kFocal], report.start.focal));
+}
+
+// A stabilised lens that goes to its stops, as a Pixel's does in the hand of somebody who runs,
+// makes the picture turn less, and later. A fit without it does not believe itself; one that may
+// try what leads astray finds it.
+TEST(CalibrateAstray, FindsAStabiliserThatNobodyHasDeclared) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 6.0;
+  scenario.camera.rate_hz = 60.0;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRunning);
+  scenario.motion.rotation_rms_rad_s = {0.53, 0.41, 0.23};  // as the Pixel's
+  scenario.tracks.noise_px = 0.5;
+  scenario.effects.optical_stabilisation = {0.95, 0.5, 0.025};
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  CalibrateOptions options;
+  options.try_what_leads_astray = false;
+  const auto plain = Calibrate(s.recording, options);
+  ASSERT_TRUE(plain.has_value()) << plain.error().message;
+  EXPECT_GT(std::abs(plain->calibration.lens[kFocal] - 650.0), 50.0);
+  EXPECT_THAT(plain->calibration.determined, Each(false));
+  EXPECT_THAT(plain->doubts, Contains(HasSubstr("was the picture stabilised?")));
+
+  const auto found = Calibrate(s.recording, {});
+  ASSERT_TRUE(found.has_value()) << found.error().message;
+  ASSERT_EQ(found->calibration.effects->items().size(), 1u);
+  EXPECT_EQ(found->calibration.effects->items()[0].entry->name, "optical_stabilisation");
+  EXPECT_EQ(found->calibration.effects->items()[0].shape, "0.5/0.025");
+  EXPECT_NEAR(found->calibration.effect_values[0], 0.95 * 650.0, 30.0);
+  // What the lens does is known from the gyro's noisy samples, of which the sigmas know nothing.
+  const StateVector error = Difference(found->calibration, s.truth);
+  EXPECT_LT(std::abs(error[kStateFocal]), 0.01 * 650.0);
+  EXPECT_LT(std::abs(error[kStateDelay]), 5e-4);
+  EXPECT_LT(std::abs(error[kStateReadout]), 5e-4);
+}
+
+TEST(Astray, OnlyAStabilisedLensFollowsTurns) {
+  const simulation::Simulated s = simulation::SimulateSensors(ShortScenario(2.0)).value();
+  Calibration c = s.truth;
+  EXPECT_FALSE(LensFollowsTurns(c));
+  for (const std::string name : {"radial_distortion", "clock_skew", "optical_stabilisation"}) {
+    c.effects = std::make_shared<const EffectSet>(
+        MakeEffects(name, MakeEffectSetup(s.recording, s.truth)).value());
+    EXPECT_EQ(LensFollowsTurns(c), name == "optical_stabilisation") << name;
+  }
 }
 
 // Without the lens's distortion, the focal length runs to six times of what it is.

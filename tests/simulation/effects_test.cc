@@ -146,6 +146,30 @@ TEST(LensEffects, OpticalStabilisationMovesThePictureAgainstTheRotation) {
   EXPECT_LT(stabilised, 0.8 * motion(SimulateTracks(scenario).value()));
 }
 
+// The lens goes no further than its stop, in any direction, and leaves it when the camera turns
+// back.
+TEST(LensEffects, OpticalStabilisationHasStops) {
+  constexpr double kTravelRad = 0.04, kStep = 1e-4;
+  Scenario scenario = NoiselessTracks();
+  scenario.effects.optical_stabilisation = {0.9, 0.5, kTravelRad};
+  const Simulated s = SimulateSensors(scenario).value();
+  Vector2d angle = Vector2d::Zero();
+  int at_stop = 0, moves = 0;
+  for (int i = 0; i < 45000; ++i) {
+    const double t = -1.0 + i * kStep;
+    if (i % 250 == 0 && t > 0.0) {
+      const Vector2d shift = s.camera->StabiliserShift(t) / (0.9 * kTrueFocalPx);
+      EXPECT_NEAR((shift - Vector2d(angle.y(), -angle.x())).norm(), 0.0, 2e-4) << t;
+      (shift.norm() > 0.99 * kTravelRad ? at_stop : moves)++;
+    }
+    const Vector3d omega = s.camera->trajectory().At(t + 0.5 * kStep).omega_cam_rad_s;
+    angle += kStep * (omega.head<2>() - 2.0 * M_PI * 0.5 * angle);
+    if (angle.norm() > kTravelRad) angle *= kTravelRad / angle.norm();
+  }
+  EXPECT_GT(at_stop, 10);
+  EXPECT_GT(moves, 10);
+}
+
 TEST(ClockEffects, SkewStepWanderAndExposure) {
   Scenario scenario = NoiselessTracks();
   scenario.camera.exposure_swing = 0.5;
