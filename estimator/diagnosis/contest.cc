@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/effects/catalogue.h"
 #include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "estimator/astray.h"
@@ -78,24 +79,34 @@ class Contest {
     }
   }
 
-  // Before all others. Where one of these brings the fit back, the others are tested beside it in
-  // the next round: what their linear gains say at the end of a fit that ran away is nothing.
+  // Before all others, and one effect after the other, in the order of the catalogue: the lens
+  // first. Where one of these brings the fit back, the others are tested beside it in the next
+  // round: what their linear gains say at the end of a fit that ran away is nothing.
   void RefitWhatLeadsAstray() {
-    std::vector<size_t> together;
-    for (size_t i = 0; i < all_.size(); ++i) {
-      if (!all_[i].candidate.entry->leads_astray) continue;
-      CandidateResult& r = all_[i].result;
-      r.tried_anyway = !r.rejected.empty();
-      r.rejected.clear();
-      together.push_back(i);
-    }
-    RefitTogether(together);
-    what_led_astray_is_refitted_ = true;
-    if (rivals_.empty()) return;
-    for (Contestant& other : all_) {
-      if (!other.candidate.entry->leads_astray && other.result.rejected.empty()) {
-        other.result.rejected = "asked when the fit is back";
+    for (const EffectEntry& entry : EffectCatalogue()) {
+      if (!entry.leads_astray) continue;
+      std::vector<size_t> together;
+      for (size_t i = 0; i < all_.size(); ++i) {
+        if (all_[i].candidate.entry != &entry) continue;
+        CandidateResult& r = all_[i].result;
+        r.tried_anyway = !r.rejected.empty();
+        r.rejected.clear();
+        together.push_back(i);
       }
+      RefitTogether(together);
+      if (!rivals_.empty()) {
+        WaitForTheFit(entry);
+        break;
+      }
+    }
+    what_led_astray_is_refitted_ = true;
+  }
+
+  // All but the effect that has brought the fit back.
+  void WaitForTheFit(const EffectEntry& back) {
+    for (Contestant& other : all_) {
+      if (other.candidate.entry == &back || !other.result.rejected.empty()) continue;
+      other.result.rejected = "asked when the fit is back";
     }
   }
 

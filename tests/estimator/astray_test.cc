@@ -130,7 +130,7 @@ TEST(CalibrateAstray, FindsAStabiliserThatNobodyHasDeclared) {
 }
 
 TEST(Astray, OnlyAStabilisedLensFollowsTurns) {
-  const simulation::Simulated s = simulation::SimulateSensors(ShortScenario(2.0)).value();
+  const simulation::Simulated s = simulation::SimulateTracks(ShortScenario(2.0)).value();
   Calibration c = s.truth;
   EXPECT_FALSE(LensFollowsTurns(c));
   for (const std::string name : {"radial_distortion", "clock_skew", "optical_stabilisation"}) {
