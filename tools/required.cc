@@ -60,8 +60,8 @@ Status CheckDetermined(const Calibration& calibration) {
   const auto& determined = calibration.determined;
   if (std::none_of(determined.begin(), determined.end(), [](bool d) { return d; })) {
     return CannotEstimate(
-        "this recording determines none of the parameters: it needs more rotation, about all three "
-        "axes, or more texture");
+        "none of the parameters is determined: the recording needs more rotation, about all three "
+        "axes, or more texture, or, if a doubt says so, has something that the model lacks");
   }
   std::string open;
   for (const std::string& name : RequiredNames()) {
