@@ -42,6 +42,7 @@ Eigen::Matrix2Xd StabilisedAngle(const EffectSetup& setup, const Stabiliser& s) 
   const double a = 2.0 * M_PI * s.corner_hz;
   const std::vector<double>& times_s = setup.gyro->times_s;
   const auto n = static_cast<Eigen::Index>(times_s.size());
+  if (n == 0) return Eigen::Matrix2Xd(2, 0);
   const Eigen::Vector3d mean = setup.gyro->values.rowwise().mean();  // the bias, nearly
   const Eigen::Matrix3Xd omega =
       setup.R_gyro_cam.transpose() * (setup.gyro->values.colwise() - mean);
