@@ -35,7 +35,7 @@ struct CalibrateOptions {
   bool online = true;  // false: no sliding window, the refinement alone
   // Where the estimate goes astray, online or in the end, another calibration is made with an
   // effect of the catalogue that leads fits so far (EffectEntry::leads_astray: the lens's
-  // distortion), and taken if the data bear it out.
+  // distortion, its stabiliser), and taken if the data bear it out.
   bool try_what_leads_astray = true;
   // Frames that no pair of the refinement has get times of their own, too, where frames have such
   // (TimesOfAllFrames).
