@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/standard_distortion.h"
 #include "estimator/start/focal_scan.h"
+#include "estimator/starting_point.h"
 #include "estimator/window/pair_selection.h"
 
 namespace camgyro {
@@ -67,7 +68,10 @@ double NoiseOverSmooth(const Recording& recording, double noise_px) {
 void LookThroughFittedLens(const Recording& recording, const CalibrateOptions& options,
                            const CameraRotationsAt& rotations_at, CalibrationReport* report) {
   const Calibration& c = report->calibration;
-  if (LensFollowsTurns(c) && report->start.focal) report->start.focal->determined = false;
+  const std::optional<StartStabiliser>& found = report->start.stabiliser;
+  if (LensFollowsTurns(c) && !(found && found->follows_turns) && report->start.focal) {
+    report->start.focal->determined = false;
+  }
   const LensParameters lens = c.FullLens();
   if (recording.HasOnlyAttitudes() || !rotations_at || lens == c.lens ||
       !IsFarFromRotations(c.lens[kFocal], report->start.focal)) {
@@ -125,12 +129,13 @@ double UnseenRms(const CalibrationReport& fit) {
 }
 
 std::optional<CalibrationReport> FitWithWhatLeadsAstray(
-    const Recording& recording, const Calibration& from, double noise_px,
+    const Recording& recording, const StartResult& start, const Calibration& from, double noise_px,
     const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with,
     const EffectEntry** added) {
   constexpr size_t kTogether = 2;  // whatever the number of threads: a fixed order of trials
   std::optional<CalibrationReport> best;
-  const EffectSetup setup = MakeEffectSetup(recording, from);
+  EffectSetup setup = MakeEffectSetup(recording, from);
+  TellOfStabiliser(start, &setup);
   for (const EffectEntry& entry : EffectCatalogue()) {
     if (!entry.leads_astray || (from.effects != nullptr && from.effects->Has(entry.name))) continue;
     const double enough_px = noise_px * kExplained;

@@ -68,14 +68,14 @@ bool IsBornOut(const CalibrationReport& fit, const std::string& effect, double b
                double noise_px);
 
 // The calibration with one of the effects that lead fits astray (EffectEntry::leads_astray) and
-// that the data bear out: of its shapes, and of several such effects, with the one that fits unseen
-// frames best; *added is that effect. from: where fits begin; noise_px: of the fit without;
-// fit_with: a fit with an effect, as --effects names it, which is called from several threads. Two
-// shapes are tried together, the usual ones first; if one of them leaves a tenth of the variance,
-// the others are not. The lens comes first, and where no more than the noise of a smooth motion is
-// left, nothing else is tried.
+// that the data bear out: of its shapes that the start does not rule out, and of several such
+// effects, with the one that fits unseen frames best; *added is that effect. from: where fits
+// begin; noise_px: of the fit without; fit_with: a fit with an effect, as --effects names it, which
+// is called from several threads. Two shapes are tried together, the usual ones first; if one of
+// them leaves a tenth of the variance, the others are not. The lens comes first, and where no more
+// than the noise of a smooth motion is left, nothing else is tried.
 std::optional<CalibrationReport> FitWithWhatLeadsAstray(
-    const Recording& recording, const Calibration& from, double noise_px,
+    const Recording& recording, const StartResult& start, const Calibration& from, double noise_px,
     const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with,
     const EffectEntry** added);
 

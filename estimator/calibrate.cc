@@ -112,6 +112,9 @@ class CalibrationJob {
       if (!point) return tl::unexpected(point.error());
       report_.prior = std::move(point->prior);
       estimate_ = std::move(point->estimate);
+      if (options_.take_stabiliser) {
+        AddStabiliser(recording_, *start, *report_.residual, &estimate_);
+      }
     }
     from_start_ = estimate_;
     graph_options_ = GraphOptionsFor(recording_, *start, options_.window.graph);
@@ -182,7 +185,7 @@ class CalibrationJob {
     const double begin_px = from_start_.lens[kFocal];
     const EffectEntry* added = nullptr;
     std::optional<CalibrationReport> best = FitWithWhatLeadsAstray(
-        recording_, from_start_, noise_px,
+        recording_, report_.start, from_start_, noise_px,
         [&](const std::string& effect) {
           CalibrateOptions with = options_;
           with.effects += (with.effects.empty() ? "" : ",") + effect;

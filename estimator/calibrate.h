@@ -37,6 +37,8 @@ struct CalibrateOptions {
   // effect of the catalogue that leads fits so far (EffectEntry::leads_astray: the lens's
   // distortion, its stabiliser), and taken if the data bear it out.
   bool try_what_leads_astray = true;
+  // A lens that the start finds to follow the camera's turns is part of the model.
+  bool take_stabiliser = true;
   // Frames that no pair of the refinement has get times of their own, too, where frames have such
   // (TimesOfAllFrames).
   bool times_between = true;

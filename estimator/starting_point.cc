@@ -86,6 +86,8 @@ Status AddStartEffects(const Recording& recording, const StartResult& start,
                        Calibration* calibration) {
   EffectSetup setup = MakeEffectSetup(recording, *calibration);
   setup.clock_skew = start.clock_skew;
+  TellOfStabiliser(start, &setup);
+  setup.lens_is_held = false;  // what is asked for is fitted
   Result<EffectSet> effects = MakeEffects(list, setup);
   if (!effects) return tl::unexpected(effects.error());
   for (const EffectEntry& entry : EffectCatalogue()) {
@@ -103,6 +105,32 @@ Status AddStartEffects(const Recording& recording, const StartResult& start,
   }
   calibration->effects = std::make_shared<const EffectSet>(std::move(*effects));
   return {};
+}
+
+void TellOfStabiliser(const StartResult& start, EffectSetup* setup) {
+  if (!start.stabiliser) return;
+  setup->lens_is_held = start.stabiliser->is_held;
+  if (!start.stabiliser->follows_turns) return;
+  setup->stabiliser = start.stabiliser->stabiliser;
+  setup->stabiliser_px_per_rad = start.stabiliser->gain * start.focal->value_px;
+}
+
+void AddStabiliser(const Recording& recording, const StartResult& start,
+                   const PairResidual& residual, Calibration* calibration) {
+  const EffectEntry& entry = *FindEffect("optical_stabilisation");
+  EffectSetup setup = MakeEffectSetup(recording, *calibration);
+  TellOfStabiliser(start, &setup);
+  const EffectSet* const before = calibration->effects.get();
+  if (!setup.stabiliser || !residual.facts().with_effects ||
+      (before != nullptr && before->Has(entry.name))) {
+    return;
+  }
+  auto effects = std::make_shared<EffectSet>(before != nullptr ? *before : EffectSet());
+  const int first = effects->size();
+  AddEffect(setup, entry, NameOf(*setup.stabiliser), residual, effects.get());
+  calibration->effect_values.conservativeResize(effects->size());
+  effects->items().back().effect->SetStart(calibration->effect_values.data() + first);
+  calibration->effects = std::move(effects);
 }
 
 PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& start,

@@ -36,6 +36,14 @@ Status AddStartEffects(const Recording& recording, const StartResult& start,
                        const std::string& list, const PairResidual& residual,
                        Calibration* calibration);
 
+// What effects may know of the start: a lens that follows the camera's turns, or one that is held.
+void TellOfStabiliser(const StartResult& start, EffectSetup* setup);
+
+// Puts optical_stabilisation into a calibration that has none, where the start has found that the
+// lens follows the camera's turns and the residual can have effects.
+void AddStabiliser(const Recording& recording, const StartResult& start,
+                   const PairResidual& residual, Calibration* calibration);
+
 // Where a fit begins, and what is held to be likely before.
 struct StartingPoint {
   Prior prior;

@@ -173,6 +173,14 @@ Status RunDelay(const std::vector<std::string>& arguments) {
                         1e3 * start.readout->sigma_s, "ms")
                     .c_str());
   }
+  if (start.stabiliser) {
+    const StartStabiliser& lens = *start.stabiliser;
+    std::printf("lens       makes up for %.1f ± %.1f %% of fast turns: %s\n", 100.0 * lens.gain,
+                100.0 * lens.gain_sigma,
+                lens.follows_turns ? "stabilised"
+                : lens.is_held     ? "not stabilised"
+                                   : "these rotations do not tell whether it is stabilised");
+  }
   std::printf(
       "trust      the camera explains %.0f %% of the gyro's motion; the next best delay, "
       "%.3f s,\n           leaves %.0f times as much unexplained\n",

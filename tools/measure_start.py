@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """How good a start is: simulates recordings, runs `camgyro delay` on them, and prints for each kind
 of motion, and for a walk round a room, what the delay, the focal length and the readout time of the
-start differ by from the truth.
+start differ by from the truth, and what it says of the lens: how much of the camera's fast turns
+it makes up for, and how many recordings are called stabilised or not.
 
     tools/measure_start.py [--camgyro PATH] [--seeds N] [--duration_s S] [--jobs N] [KEY=VALUE...]
 
@@ -34,9 +35,16 @@ def found(text):
             for match in (delay, focal, readout)]
 
 
+def lens_of(text):
+    """How much of fast turns the lens makes up for [%], and what the start calls it."""
+    match = re.search("^lens +makes up for " + NUMBER + " ± [0-9.]+ % of fast turns: (.*)$", text,
+                      re.M)
+    return (float(match.group(1)), match.group(2)) if match else None
+
+
 def measure(camgyro, scenario, seed, duration_s, changes):
     """Of the delay [ms], the focal length [%] and the readout time [ms]: error and sigma, or
-    nothing; None if the recording is refused."""
+    nothing; last what lens_of says; None if the recording is refused."""
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([camgyro, "simulate", SOURCE + "/tools/scenarios/%s.yaml" % scenario,
                         "seed=%d" % seed, "duration_s=%g" % duration_s, "tracks.noise_px=0.5",
@@ -52,7 +60,7 @@ def measure(camgyro, scenario, seed, duration_s, changes):
     right = (1e3 * truth["clock"]["delay_s"]["value"] + 0.5 * readout_ms, focal_px, readout_ms)
     scale = (1.0, 100.0 / focal_px, 1.0)
     return [value and (s * (value[0] - r), s * value[1])
-            for value, r, s in zip(found(run.stdout), right, scale)]
+            for value, r, s in zip(found(run.stdout), right, scale)] + [lens_of(run.stdout)]
 
 
 def cell(values, runs):
@@ -65,6 +73,15 @@ def cell(values, runs):
     return text if len(values) == runs else text + ", %d of %d" % (len(values), runs)
 
 
+def lens_cell(lenses):
+    """Range of what the lens makes up for, and how many are called what."""
+    if not lenses:
+        return "-"
+    gains, verdicts = zip(*lenses)
+    return "%.1f to %.1f %%; %d stabilised, %d not" % (
+        min(gains), max(gains), verdicts.count("stabilised"), verdicts.count("not stabilised"))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawTextHelpFormatter)
@@ -74,8 +91,8 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("changes", nargs="*")
     options = parser.parse_args()
-    print("| Motion | refused | delay [ms] | focal length [%] | readout [ms] |")
-    print("| --- | --- | --- | --- | --- |")
+    print("| Motion | refused | delay [ms] | focal length [%] | readout [ms] | lens |")
+    print("| --- | --- | --- | --- | --- | --- |")
     with ThreadPoolExecutor(options.jobs) as pool:
         for scenario in SCENARIOS:
             runs = list(pool.map(lambda seed, s=scenario: measure(
@@ -83,6 +100,7 @@ def main():
                                  range(1, options.seeds + 1)))
             good = [run for run in runs if run]
             cells = [cell([run[k] for run in good if run[k]], len(good)) for k in range(3)]
+            cells.append(lens_cell([run[3] for run in good if run[3]]))
             print("| %s | %d | %s |" % (scenario.split("_")[1], len(runs) - len(good),
                                         " | ".join(cells)), flush=True)
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/lens.h"
+#include "core/optical_stabiliser.h"
 
 namespace camgyro {
 
@@ -121,6 +122,11 @@ struct EffectSetup {
       std::make_shared<SensorSamples>();
   double delay_s = 0.0, readout_s = 0.0;  // as far as they are known
   double clock_skew = 0.0;                // that the start has found [s/s]; 0: none
+  // A lens that follows the camera's turns, if the start has found one, and its shift [px/rad]; or
+  // the start has seen that the lens is held.
+  std::optional<OpticalStabiliser> stabiliser;
+  double stabiliser_px_per_rad = 0.0;
+  bool lens_is_held = false;
   // Standard deviation of the frames' stamps around a clock where they are times of arrival [s]; 0:
   // they are not, or nobody has looked.
   double frame_stamp_jitter_s = 0.0;

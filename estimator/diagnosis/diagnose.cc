@@ -51,7 +51,7 @@ Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAt& rotations_a
                                             std::vector<DataFault>* faults) {
   // The loop finds what leads fits astray by itself, and shows what it gains in unseen frames.
   CalibrateOptions plain = options;
-  plain.try_what_leads_astray = false;
+  plain.try_what_leads_astray = plain.take_stabiliser = false;
   plain.times_between = false;  // AddTimesBetween
   Result<CalibrationReport> report =
       CalibrateRecording(*recording, rotations_at, plain, Part(progress, 0.0, 1.0));
@@ -143,6 +143,7 @@ Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOpti
   const CalibrationReport& report = *diagnosis.before;
   LoopInput input;
   input.recording = &recording;
+  input.found = report.start;
   input.prior = MakePrior(recording, report.start);
   input.fit = report.calibration;
   input.start = input.prior.mean;

@@ -101,6 +101,7 @@ struct LoopInput {
   const Recording* recording = nullptr;
   Calibration fit;    // as the plain model has it
   Calibration start;  // where it all began
+  StartResult found;  // and what was found there
   Prior prior;
   PairGraphOptions graph;
   double noise = 1.0;                       // first guess [px], attitudes [rad]

@@ -15,6 +15,7 @@
 #include "estimator/diagnosis/step_search.h"
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
+#include "estimator/starting_point.h"
 
 namespace camgyro {
 namespace {
@@ -236,7 +237,7 @@ class Loop {
     for (const auto& entry : where) out->where.push_back(entry.second);
     out->unexplained_structure = !where.empty();
     out->indistinguishable = Indistinguishable(
-        fit_.calibration, MakeEffectSetup(*in_.recording, fit_.calibration), in_.prior,
+        fit_.calibration, Setup(), in_.prior,
         [this](const Calibration& calibration, std::shared_ptr<const EffectSet> candidates) {
           return fits_.ScoresOf(fits_.shares().choice, calibration, std::move(candidates),
                                 fit_.quality.noise_px);
@@ -247,6 +248,12 @@ class Loop {
       const bool known = std::count(out->effects.begin(), out->effects.end(), item.entry->name) > 0;
       if (!known || item.entry->adds_up) out->effects.push_back(item.entry->name);
     }
+  }
+
+  EffectSetup Setup() const {
+    EffectSetup setup = MakeEffectSetup(*in_.recording, fit_.calibration);
+    TellOfStabiliser(in_.found, &setup);
+    return setup;
   }
 
   // It is in the model since the user has named it, and not since the data show it.
@@ -297,7 +304,7 @@ class Loop {
   bool Round(int round, bool may_add, DiagnosisRound* result) {
     const double noise = fit_.quality.noise_px;
     Tell(round, 0.1);
-    EffectSetup setup = MakeEffectSetup(*in_.recording, fit_.calibration);
+    EffectSetup setup = Setup();
     // Before the candidates, whose scores of an hour need not be beside those of the maps, 125 MB.
     last_maps_ = Maps(setup);
     Tell(round, 0.2);

@@ -16,6 +16,7 @@
 #include "estimator/diagnosis/thresholds.h"
 #include "estimator/diagnosis/unseen_parallax.h"
 #include "estimator/halves.h"
+#include "estimator/starting_point.h"
 #include "estimator/window/estimation_input.h"
 
 namespace camgyro {
@@ -61,7 +62,9 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
              const CalibrationReport& report) {
   Tested t;
   const Calibration& model = report.calibration;
-  t.candidates = MissingEffects(model, MakeEffectSetup(recording, model));
+  EffectSetup setup = MakeEffectSetup(recording, model);
+  TellOfStabiliser(report.start, &setup);
+  t.candidates = MissingEffects(model, setup);
   auto set = std::make_shared<EffectSet>();
   const int first = kStateSize + static_cast<int>(model.effect_values.size());
   std::vector<Candidate> with_columns;

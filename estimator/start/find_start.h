@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/optical_stabiliser.h"
 #include "core/recording.h"
 #include "core/result.h"
 
@@ -56,6 +57,15 @@ struct StartReadout {
   bool determined = false;
 };
 
+// What rotations tell of a lens that follows the camera's turns (stabiliser_search.h).
+struct StartStabiliser {
+  OpticalStabiliser stabiliser;
+  double gain = 0.0;  // of the lens: 0: it is held; 1: nothing of the stabilised angle is left
+  double gain_sigma = 0.0;
+  bool follows_turns = false;  // beyond doubt
+  bool is_held = false;        // no gain that a stabiliser has, at 3 sigma
+};
+
 struct StartResult {
   // t_gyro = t_camera + delay, for the instant that the camera rotations belong to. Rotations of
   // whole pictures of a rolling shutter belong to the middle row: this is t_d + t_r / 2 then.
@@ -93,8 +103,9 @@ struct StartResult {
   double gyro_rms_rad_s = 0.0;  // of the intervals' mean rates about their mean, all axes together
   int pairs = 0;
 
-  std::optional<StartFocal> focal;      // set by FindStartAndFocal (focal_scan.h)
-  std::optional<StartReadout> readout;  // the same; a declared one has no sigma
+  std::optional<StartFocal> focal;            // set by FindStartAndFocal (focal_scan.h)
+  std::optional<StartReadout> readout;        // the same; a declared one has no sigma
+  std::optional<StartStabiliser> stabiliser;  // the same, where there are pairs enough
   std::vector<std::string> notes;
 };
 

@@ -14,6 +14,7 @@
 #include "estimator/start/lag_search.h"
 #include "estimator/start/rate_alignment.h"
 #include "estimator/start/scan_curve.h"
+#include "estimator/start/stabiliser_search.h"
 #include "estimator/start/start_fit.h"
 
 namespace camgyro {
@@ -125,12 +126,6 @@ class FocalScan {
       start = StartAt(focal.value_px);
     }
     if (!start) return start;
-    if (!focal.determined) {
-      start->notes.push_back(
-          "the focal length is not determined (too little pan and tilt, or a distorting lens); " +
-          std::string(recording_.camera.focal_px ? "the recording's guess" : "a usual one") +
-          " is used");
-    }
     start->focal = std::move(focal);
     start->readout = readout;
     return start;
@@ -317,6 +312,30 @@ class FocalScan {
   double best_focal_px_ = 0.0;
 };
 
+// The start through a usual lens, or through a tele lens where that explains more.
+Result<StartResult> ScanUsualAndTele(const Recording& recording,
+                                     const CameraRotationsAt& rotations_at,
+                                     const StartOptions& options,
+                                     const FocalScanOptions& scan_options) {
+  FocalScan usual(recording, rotations_at, options, scan_options);
+  const Status near = usual.FindNear();
+  const double near_explained = usual.explained();
+  Result<StartResult> start = near ? usual.Refine() : tl::unexpected(near.error());
+  if (start && start->explained >= kWellExplained) return start;
+  // Through a tele lens, a usual focal length makes pan and tilt several times too large, but not
+  // roll. What fits the gyro best then has little to do with how it lies, and rotations that are
+  // made near to that fit the gyro's best at the shortest focal lengths. A longer one is tried that
+  // explains distinctly more, by rotations that are not made near to anything.
+  FocalScanOptions longer = scan_options;
+  longer.min_focal = scan_options.max_focal / kTeleOverlap;
+  longer.max_focal = scan_options.longest_focal;
+  if (!(longer.max_focal > longer.min_focal)) return start;
+  FocalScan tele(recording, rotations_at, options, longer);
+  if (!tele.FindBestNear(1.0 - kMaxRunnerUp * (1.0 - near_explained))) return start;
+  Result<StartResult> better = tele.Refine();
+  return better && (!start || better->explained > start->explained) ? better : start;
+}
+
 }  // namespace
 
 Result<StartResult> FindStartAndFocal(const Recording& recording,
@@ -336,23 +355,16 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   if (scan_options.readouts < 5 || !(scan_options.max_readout > 0.0)) {
     return BadUsage("readout scan: expected 5 points or more and 0 < max_readout");
   }
-  FocalScan usual(recording, rotations_at, options, scan_options);
-  const Status near = usual.FindNear();
-  const double near_explained = usual.explained();
-  Result<StartResult> start = near ? usual.Refine() : tl::unexpected(near.error());
-  if (start && start->explained >= kWellExplained) return start;
-  // Through a tele lens, a usual focal length makes pan and tilt several times too large, but not
-  // roll. What fits the gyro best then has little to do with how it lies, and rotations that are
-  // made near to that fit the gyro's best at the shortest focal lengths. A longer one is tried that
-  // explains distinctly more, by rotations that are not made near to anything.
-  FocalScanOptions longer = scan_options;
-  longer.min_focal = scan_options.max_focal / kTeleOverlap;
-  longer.max_focal = scan_options.longest_focal;
-  if (!(longer.max_focal > longer.min_focal)) return start;
-  FocalScan tele(recording, rotations_at, options, longer);
-  if (!tele.FindBestNear(1.0 - kMaxRunnerUp * (1.0 - near_explained))) return start;
-  Result<StartResult> better = tele.Refine();
-  return better && (!start || better->explained > start->explained) ? better : start;
+  Result<StartResult> start = ScanUsualAndTele(recording, rotations_at, options, scan_options);
+  if (!start) return start;
+  LookForStabiliser(recording, rotations_at, &*start);
+  if (!start->focal->determined) {
+    start->notes.push_back(
+        "the focal length is not determined (too little pan and tilt, or a distorting lens); " +
+        std::string(recording.camera.focal_px ? "the recording's guess" : "a usual one") +
+        " is used");
+  }
+  return start;
 }
 
 Result<StartResult> FindStartFromPictures(const Recording& recording,

@@ -2,19 +2,12 @@
 #ifndef CAMGYRO_ESTIMATOR_START_FOCAL_SCAN_H_
 #define CAMGYRO_ESTIMATOR_START_FOCAL_SCAN_H_
 
-#include <functional>
-#include <vector>
-
 #include "core/recording.h"
 #include "core/result.h"
+#include "estimator/start/camera_rotations_at.h"
 #include "estimator/start/find_start.h"
 
 namespace camgyro {
-
-// Camera rotations as a recording's pictures give them in each of some trials, which are best
-// sorted. About sixty in all; a few hundred pairs are enough.
-using CameraRotationsAt = std::function<std::vector<std::vector<CameraRotation>>(
-    const Recording& recording, const std::vector<RotationTrial>& trials)>;
 
 struct FocalScanOptions {
   // Of the picture's longer side: 0.4 is a full field of view of 103 deg, 1.8 of 31 deg. Where the
@@ -45,6 +38,8 @@ struct FocalScanOptions {
 //
 // What explains less than kWellExplained is held against a start through a tele lens, which is
 // scanned from max_focal to longest_focal, if that explains distinctly more.
+//
+// Last comes LookForStabiliser (stabiliser_search.h).
 Result<StartResult> FindStartAndFocal(const Recording& recording,
                                       const CameraRotationsAt& rotations_at,
                                       const StartOptions& options,

@@ -62,6 +62,21 @@ TEST(OpticalStabilisation, StopsAreOfferedWhereTheMotionReachesThem) {
   EXPECT_TRUE(entry.shapes(attitudes).empty());
 }
 
+TEST(OpticalStabilisation, HasTheShapeThatTheStartHasFound) {
+  const EffectEntry& entry = *FindEffect("optical_stabilisation");
+  EffectSetup setup = Circling(0.06);
+  setup.lens_is_held = true;
+  EXPECT_TRUE(entry.shapes(setup).empty());
+  EXPECT_TRUE(MakeEffects("optical_stabilisation:0.5", setup));  // what is asked for is made
+  setup.lens_is_held = false;
+  setup.stabiliser = OpticalStabiliser{0.62, 0.031};
+  setup.stabiliser_px_per_rad = 432.0;
+  EXPECT_THAT(entry.shapes(setup), ElementsAre("0.62/0.031"));
+  double start = 0.0;
+  entry.make(setup, "0.62/0.031")->SetStart(&start);
+  EXPECT_EQ(start, 432.0);
+}
+
 TEST(OpticalStabilisation, RefusesWhatIsNoShape) {
   for (const std::string shape : {"x", "0", "-1", "0.5/", "0.5/0", "0.5/0.02x", "0.5x"}) {
     EXPECT_FALSE(MakeEffects("optical_stabilisation:" + shape, Circling(0.06))) << shape;
