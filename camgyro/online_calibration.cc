@@ -33,9 +33,14 @@ constexpr double kStaleS = 5.0;  // frames without a solved window
 constexpr double kSkewWalk_rtHz = 20e-6;
 constexpr char kEffects[] = "clock_skew";
 
+// The window would have to know the lens at every sample to come.
+tl::unexpected<Error> StabilisedLens() {
+  return CannotEstimate("the lens moves as the camera turns: switch its stabilisation off");
+}
+
 // A fit of all that was collected, with the distortion of a lens that nothing declares where it
 // leads fits astray: a window without it runs to any focal length. Nothing where the fit leads
-// nowhere. Errors: a stabilised lens, which the window would have to know at every sample to come.
+// nowhere. Errors: a stabilised lens.
 Result<std::optional<Calibration>> FitCollected(const Recording& recording,
                                                 const CameraRotationsAt& rotations_at,
                                                 const StartResult& start, const Calibration& from) {
@@ -45,9 +50,7 @@ Result<std::optional<Calibration>> FitCollected(const Recording& recording,
   options.times_between = false;
   Result<CalibrationReport> fit = CalibrateRecording(recording, rotations_at, options);
   if (!fit || !fit->converged) return std::nullopt;
-  if (LensFollowsTurns(fit->calibration)) {
-    return CannotEstimate("the lens moves as the camera turns: switch its stabilisation off");
-  }
+  if (LensFollowsTurns(fit->calibration)) return StabilisedLens();
   const double focal_px = fit->calibration.lens[kFocal];
   if (RanAway(focal_px, from.lens[kFocal]) || IsFarFromRotations(focal_px, fit->start.focal)) {
     return std::nullopt;
@@ -151,6 +154,7 @@ Status OnlineCalibration::TryStart() {
   const CameraRotationsAt rotations_at = RotationsFrom(recording, kMaxScanPairs);
   const Result<StartResult> start = FindStartAndFocal(recording, rotations_at, options, {});
   if (!start) return tl::unexpected(start.error());
+  if (start->stabiliser && start->stabiliser->follows_turns) return StabilisedLens();
 
   GapLimits limits = kGapLimitsOnline;
   limits.least_pairs = 10;

@@ -122,5 +122,18 @@ TEST(CalibratorFaults, SurvivesStreamsThatStopAndClocksThatJump) {
             5.0);
 }
 
+// Its window would have to know where the lens is at every sample to come: it says so, and has no
+// estimate.
+TEST(CalibratorFaults, SaysThatTheLensIsStabilised) {
+  simulation::Scenario scenario = LivelyScenario(9.0);
+  scenario.effects.optical_stabilisation = {0.9, 0.5, 0.025};
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  EXPECT_FALSE(calibrator->snapshot()->has_estimate);
+  EXPECT_THAT(calibrator->snapshot()->message, testing::HasSubstr("switch its stabilisation off"));
+}
+
 }  // namespace
 }  // namespace camgyro::api
