@@ -45,13 +45,13 @@ Case RandomCase(uint64_t seed) {
   c.lens = MakePinhole(460.0, {370.0, 245.0}, 1.01);
   c.lens.segment<4>(kK1) << -0.25, 0.06, 0.002, -0.001;
   c.shutter << 0.025, 0.004;
-  c.q_gyro_cam = Exp(Vector3d(normal(generator), normal(generator), normal(generator)));
+  c.q_gyro_cam = Exp(Vector3d{normal(generator), normal(generator), normal(generator)});
   c.rates.resize(3, 10);
   for (int i = 0; i < 10; ++i) {
     c.times.push_back(0.007 * i);
-    c.rates.col(i) = 3.0 * Vector3d(normal(generator), normal(generator), normal(generator));
+    c.rates.col(i) = 3.0 * Vector3d{normal(generator), normal(generator), normal(generator)};
   }
-  c.px = Vector2d(752 * uniform(generator), 480 * uniform(generator));
+  c.px = Vector2d{752 * uniform(generator), 480 * uniform(generator)};
   return c;
 }
 

@@ -28,7 +28,7 @@ Chain RandomChain(uint64_t seed, int n) {
   for (int i = 0; i < n; ++i) {
     chain.times.push_back(time);
     time += interval(generator);
-    chain.rates.col(i) = Vector3d(normal(generator), normal(generator), normal(generator));
+    chain.rates.col(i) = Vector3d{normal(generator), normal(generator), normal(generator)};
   }
   return chain;
 }

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 
 Vector3d RandomVector(std::mt19937_64* generator, double scale) {
   std::normal_distribution<double> normal;
-  return scale * Vector3d(normal(*generator), normal(*generator), normal(*generator));
+  return scale * Vector3d{normal(*generator), normal(*generator), normal(*generator)};
 }
 
 TEST(So3, ExpAgreesWithAngleAxisAtAllSizes) {

@@ -110,8 +110,8 @@ TEST(CoplanarityPlane, NoiseHasUnitVarianceWhenBothImagesAreNoisy) {
   int count = 0;
   for (int trial = 0; trial < 100; ++trial) {
     for (size_t i = 0; i < exact.size(); ++i) {
-      s.pair->matches[i].px_a = exact[i].px_a + Eigen::Vector2d(noise(generator), noise(generator));
-      s.pair->matches[i].px_b = exact[i].px_b + Eigen::Vector2d(noise(generator), noise(generator));
+      s.pair->matches[i].px_a = exact[i].px_a + Eigen::Vector2d{noise(generator), noise(generator)};
+      s.pair->matches[i].px_b = exact[i].px_b + Eigen::Vector2d{noise(generator), noise(generator)};
     }
     for (const double r : Residuals(CoplanarityPlane(s.pair), s.Parameters())) {
       sum_sq += r * r;
@@ -247,8 +247,8 @@ TEST(CoplanarityDeterminant, NoiseHasUnitVariance) {
   int count = 0;
   for (int trial = 0; trial < 100; ++trial) {
     for (size_t i = 0; i < exact.size(); ++i) {
-      s.pair->matches[i].px_a = exact[i].px_a + Eigen::Vector2d(noise(generator), noise(generator));
-      s.pair->matches[i].px_b = exact[i].px_b + Eigen::Vector2d(noise(generator), noise(generator));
+      s.pair->matches[i].px_a = exact[i].px_a + Eigen::Vector2d{noise(generator), noise(generator)};
+      s.pair->matches[i].px_b = exact[i].px_b + Eigen::Vector2d{noise(generator), noise(generator)};
     }
     const CoplanarityDeterminant factor(s.pair, RandomTriplets(60, 60, trial));
     for (const double r : Residuals(factor, s.Parameters(false))) {

@@ -39,7 +39,7 @@ TEST(MarginalPrior, JacobianMatchesDifferencesFarFromTheLinearisation) {
   std::normal_distribution<double> normal;
   for (int trial = 0; trial < 20; ++trial) {
     const Quaterniond q_lin =
-        Exp(Vector3d(normal(generator), normal(generator), normal(generator)));
+        Exp(Vector3d{normal(generator), normal(generator), normal(generator)});
     MatrixXd S(4, 5);
     for (int i = 0; i < S.size(); ++i) S.data()[i] = normal(generator);
     const MarginalPrior prior(

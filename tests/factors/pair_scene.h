@@ -122,12 +122,12 @@ inline void Disturb(uint64_t seed, PairScene* s) {
   s->shutter[kDelay] += 0.002 * normal(generator);
   s->shutter[kReadout] += 0.003 * normal(generator);
   s->q_gyro_cam = s->q_gyro_cam * Exp(Eigen::Vector3d(0.02, -0.03, 0.01));
-  s->tau = (s->tau + 0.1 * Eigen::Vector3d(normal(generator), normal(generator), normal(generator)))
+  s->tau = (s->tau + 0.1 * Eigen::Vector3d{normal(generator), normal(generator), normal(generator)})
                .normalized();
   s->bend << 0.2, -0.1, 0.15, -0.05, 0.1, 0.03;
   for (Match& match : s->pair->matches) {
-    match.px_a += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));
-    match.px_b += 0.3 * Eigen::Vector2d(normal(generator), normal(generator));
+    match.px_a += 0.3 * Eigen::Vector2d{normal(generator), normal(generator)};
+    match.px_b += 0.3 * Eigen::Vector2d{normal(generator), normal(generator)};
   }
 }
 

@@ -44,7 +44,7 @@ Scene MakeScene(uint64_t seed) {
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
   const auto random_vector = [&] {
-    return Vector3d(normal(generator), normal(generator), normal(generator));
+    return Vector3d{normal(generator), normal(generator), normal(generator)};
   };
   Scene s;
   s.shutter << 0.02, 0.012;

@@ -60,8 +60,8 @@ TEST(RelativeYawPosition, JacobiansMatchDifferences) {
     measured.yaw_a_b_rad = normal(random);
     measured.covariance = Vector4d(0.04, 0.01, 0.09, 1e-3).asDiagonal();
     measured.covariance(0, 3) = measured.covariance(3, 0) = 2e-3;
-    Vector4d a(normal(random), normal(random), normal(random), normal(random));
-    Vector4d b(normal(random), normal(random), normal(random), normal(random));
+    Vector4d a{normal(random), normal(random), normal(random), normal(random)};
+    Vector4d b{normal(random), normal(random), normal(random), normal(random)};
     b[3] = a[3] + measured.yaw_a_b_rad + 0.5 * std::tanh(b[3]);  // away from the step at pi
     ExpectJacobiansMatchDifferences(*MakeRelativeYawPosition(measured), {a.data(), b.data()}, 1e-6,
                                     {a.data(), b.data()});

@@ -105,8 +105,8 @@ TEST(SymmetricTransfer, IsWhitened) {
   double sum = 0.0;
   for (int i = 0; i < kDraws; ++i) {
     for (size_t k = 0; k < exact.size(); ++k) {
-      s.pair->matches[k].px_a = exact[k].px_a + Vector2d(normal(random), normal(random));
-      s.pair->matches[k].px_b = exact[k].px_b + Vector2d(normal(random), normal(random));
+      s.pair->matches[k].px_a = exact[k].px_a + Vector2d{normal(random), normal(random)};
+      s.pair->matches[k].px_b = exact[k].px_b + Vector2d{normal(random), normal(random)};
     }
     sum += Residuals(&s).squaredNorm();
   }
@@ -126,8 +126,8 @@ TEST(SymmetricTransfer, TwoResidualsOfAMatchAreIndependent) {
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
   for (int i = 0; i < kDraws; ++i) {
     for (size_t k = 0; k < exact.size(); ++k) {
-      s.pair->matches[k].px_a = exact[k].px_a + Vector2d(normal(random), normal(random));
-      s.pair->matches[k].px_b = exact[k].px_b + Vector2d(normal(random), normal(random));
+      s.pair->matches[k].px_a = exact[k].px_a + Vector2d{normal(random), normal(random)};
+      s.pair->matches[k].px_b = exact[k].px_b + Vector2d{normal(random), normal(random)};
     }
     s.pair->robust_threshold = 0.0;
     const VectorXd four = Residuals(&s);

@@ -69,14 +69,14 @@ TEST(TurnedProjection, JacobiansMatchDifferences) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (int i = 0; i < 20; ++i) {
     TurnedProjection seen;
-    const auto vector = [&] { return Vector3d(unit(random), unit(random), unit(random)); };
+    const auto vector = [&] { return Vector3d{unit(random), unit(random), unit(random)}; };
     seen.pivot_m = vector();
     seen.p_cam_m = vector() - Vector3d(2.0, 0.0, 0.0);
     seen.point_m = vector() + Vector3d(6.0, 0.0, 0.0);
     seen.q_world_cam = AlongX() * Eigen::Quaterniond(Eigen::AngleAxisd(0.3, vector().normalized()));
     seen.ray = RayOf({320.0 + 300.0 * unit(random), 240.0 + 200.0 * unit(random)});
     seen.sigma_px = 0.7;
-    Vector4d at(unit(random), unit(random), unit(random), 0.3 * unit(random));
+    Vector4d at{unit(random), unit(random), unit(random), 0.3 * unit(random)};
     ExpectJacobiansMatchDifferences(*MakeTurnedProjection(seen), {at.data()}, 1e-6, {at.data()});
   }
 }

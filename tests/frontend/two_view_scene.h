@@ -36,7 +36,7 @@ struct TwoViewScene {
         continue;
       }
       const auto noise = [&] {
-        return Eigen::Vector2d(noise_px * Eigen::Vector2d(normal(generator), normal(generator)));
+        return Eigen::Vector2d(noise_px * Eigen::Vector2d{normal(generator), normal(generator)});
       };
       pair.matches.push_back({px_a + noise(), *px_b + noise()});
     }

@@ -203,8 +203,8 @@ TEST(ImplicitEkf, NoiseOfAllSixRaysEnters) {
   for (int i = 0; i < kDraws; ++i) {
     ImplicitEkf::Pair noisy = m.pair;
     for (Match& match : noisy.matches) {
-      match.px_a += Eigen::Vector2d(normal(random), normal(random));
-      match.px_b += Eigen::Vector2d(normal(random), normal(random));
+      match.px_a += Eigen::Vector2d{normal(random), normal(random)};
+      match.px_b += Eigen::Vector2d{normal(random), normal(random)};
     }
     ASSERT_TRUE(m.run.filter.Measure(noisy, x, &drawn));
     sum_sq += (drawn.h - z.h).cwiseAbs2();

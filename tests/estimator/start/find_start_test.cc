@@ -95,7 +95,7 @@ TEST(FindStart, OutliersAreWeighedDown) {
   for (size_t i = 0; i < s.rotations.size(); i += 5) {  // 20 % wrong, a few of them absurd
     const double size_rad = i % 25 == 0 ? 1.0 : 0.05;
     s.rotations[i].q_a_b =
-        Exp(Eigen::Vector3d(size_rad * Eigen::Vector3d(normal(random), normal(random), 1.0)));
+        Exp(Eigen::Vector3d(size_rad * Eigen::Vector3d{normal(random), normal(random), 1.0}));
   }
   const auto start = FindStart(s.recording, s.rotations, {});
   ASSERT_TRUE(start) << start.error().message;

@@ -31,7 +31,7 @@ inline RateFunction SmoothRandomRate(int seed, double rms_rad_s) {
   std::vector<Sine> sines;
   constexpr int kSines = 24;
   for (int k = 0; k < kSines; ++k) {
-    const Eigen::Vector3d direction(normal(random), normal(random), normal(random));
+    const Eigen::Vector3d direction{normal(random), normal(random), normal(random)};
     const double hz = 0.2 * std::pow(15.0, uniform(random));
     sines.push_back({direction * rms_rad_s * std::sqrt(2.0 / (3.0 * kSines)), 2.0 * M_PI * hz,
                      2.0 * M_PI * uniform(random)});
@@ -65,7 +65,7 @@ inline Simulated Simulate(const RateFunction& rate, const SimulatedTruth& truth,
   std::mt19937 random(static_cast<unsigned>(seed));
   std::normal_distribution<double> normal;
   const auto noise = [&] {
-    return Eigen::Vector3d(normal(random), normal(random), normal(random));
+    return Eigen::Vector3d{normal(random), normal(random), normal(random)};
   };
   Simulated out;
   const double start_s = 1e-9 * static_cast<double>(truth.first_frame_ns) + truth.delay_s;

@@ -24,7 +24,7 @@ std::vector<PairTimes> DrawPairs(int frames, double spread_s, double sigma_s, ui
     L << 1.0, -1.0, 0.1, 0.1 + 0.05 * normal(random);
     L /= sigma_s;
     const Eigen::Vector2d measured =
-        L * offsets->segment<2>(i) + Eigen::Vector2d(normal(random), normal(random));
+        L * offsets->segment<2>(i) + Eigen::Vector2d{normal(random), normal(random)};
     pairs.push_back({i, i + 1, -L.transpose() * measured, L.transpose() * L});
   }
   return pairs;

@@ -36,7 +36,7 @@ std::vector<PairTimes> Measure(const Eigen::VectorXd& offsets, double sigma_s,
     L << 1.0, -1.0, 0.3, 0.3;
     L /= sigma_s;
     const Eigen::Vector2d measured =
-        L * offsets.segment<2>(i) + Eigen::Vector2d(normal(*random), normal(*random));
+        L * offsets.segment<2>(i) + Eigen::Vector2d{normal(*random), normal(*random)};
     pairs.push_back({Number(i), Number(i + 1), -L.transpose() * measured, L.transpose() * L});
   }
   return pairs;

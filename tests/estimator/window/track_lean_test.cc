@@ -19,7 +19,7 @@ TEST(TrackLeans, AddUpInAnyParts) {
   for (int i = 0; i < 200; ++i) {
     const int64_t track_id = i % 20;
     const double sigmas = normal(generator);
-    const Eigen::Vector2d across(normal(generator), normal(generator));
+    const Eigen::Vector2d across{normal(generator), normal(generator)};
     all.Add(track_id, sigmas, across);
     (i < 90 ? first : second).Add(track_id, sigmas, across);
   }
