@@ -101,7 +101,9 @@ TEST(LookForStabiliser, FindsTheLensAndWithItDelayAndFocalLength) {
       EXPECT_NEAR(start->delay_middle_row_s, truth.delay_s, 0.003);
       EXPECT_TRUE(start->focal->determined);
       EXPECT_NEAR(start->focal->value_px, kTrueFocal_px, 2.0 * start->focal->sigma_px);
-      EXPECT_LT(start->q_gyro_cam.angularDistance(truth.q_gyro_cam), 0.02);
+      const Eigen::Vector3d turned = Log(truth.q_gyro_cam.conjugate() * start->q_gyro_cam);
+      EXPECT_LT(turned.cwiseQuotient(start->rotation_sigma_rad).cwiseAbs().maxCoeff(), 4.0);
+      EXPECT_LT(start->rotation_sigma_rad.maxCoeff(), 0.02);
       EXPECT_GT(start->explained, 0.9);
       EXPECT_FALSE(start->readout->determined);
       EXPECT_THAT(start->notes, Contains(HasSubstr("the lens follows the camera's turns")));
