@@ -41,8 +41,11 @@ Eigen::Matrix2Xd StabilisedAngle(const std::vector<double>& times_s,
     const Eigen::Vector2d input =
         0.5 * (decay * omega_cam_rad_s.col(i - 1) + omega_cam_rad_s.col(i)).head<2>();
     angle.col(i) = decay * angle.col(i - 1) + dt * input;
-    const double size = angle.col(i).norm();
-    if (size > stabiliser.travel_rad) angle.col(i) *= stabiliser.travel_rad / size;
+    const Eigen::Vector2d off_centre = angle.col(i) - stabiliser.centre_rad;
+    const double size = off_centre.norm();
+    if (size > stabiliser.travel_rad) {
+      angle.col(i) = stabiliser.centre_rad + stabiliser.travel_rad / size * off_centre;
+    }
   }
   return angle;
 }

@@ -15,6 +15,8 @@ namespace camgyro {
 struct OpticalStabiliser {
   double corner_hz = 0.0;
   double travel_rad = std::numeric_limits<double>::infinity();
+  // Of the circle of the stops, about the camera's x and y axes, from where the lens rests [rad].
+  Eigen::Vector2d centre_rad = Eigen::Vector2d::Zero();
 };
 
 // By name, CORNER or CORNER/TRAVEL; none for any other text.
@@ -23,7 +25,7 @@ std::string NameOf(const OpticalStabiliser& stabiliser);
 
 // The angle that the lens makes up for at the times of some rates, about the camera's x and y axes
 // [rad]: angle' = omega - 2 pi corner angle, exact for rates that are linear between samples up to
-// the second order of the step, and never further from zero than the lens goes, in any direction:
+// the second order of the step, and never further from the stops' centre than the lens goes:
 // what is beyond is lost, so that the lens leaves its stop as soon as the camera turns back. After
 // a hole in the rates nobody knows where the lens is: the angle begins anew, at zero.
 //   times_s: ascending; omega_cam_rad_s: about the camera's axes, one column per time

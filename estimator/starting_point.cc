@@ -128,7 +128,7 @@ void AddStabiliser(const Recording& recording, const StartResult& start,
   auto effects = std::make_shared<EffectSet>(before != nullptr ? *before : EffectSet());
   const int first = effects->size();
   AddEffect(setup, entry, NameOf(*setup.stabiliser), residual, effects.get());
-  calibration->effect_values.conservativeResize(effects->size());
+  calibration->effect_values.conservativeResizeLike(Eigen::VectorXd::Zero(effects->size()));
   effects->items().back().effect->SetStart(calibration->effect_values.data() + first);
   calibration->effects = std::move(effects);
 }

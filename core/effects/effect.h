@@ -162,6 +162,10 @@ struct EffectEntry {
   // file says so); null if there is no such shape here.
   std::function<std::shared_ptr<const Effect>(const EffectSetup&, const std::string& shape)> make =
       {};
+  // For an effect whose shape has numbers that a fit tells better: the shape by the values of a fit
+  // with it (as many as the effect's parameters, which become what they are in the new shape). Null
+  // for all others.
+  std::function<std::string(const std::string& shape, double* values)> shape_by_fit = {};
   // For an effect that changes t_d by a step and whose shape is the time of that step, which
   // diagnosis searches: the effect from the first frame on whose stamp is not before `stamp_s`.
   // Null for all others.

@@ -1,7 +1,7 @@
 // A lens group that moves against fast rotation.
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,17 +22,76 @@ Eigen::Matrix2Xd AngleAtSamples(const EffectSetup& setup, const OpticalStabilise
                          setup.R_gyro_cam.transpose() * (values.colwise() - mean), stabiliser);
 }
 
-// The picture shifts in proportion to the stabilised angle, by gain * f [px per rad]. Stabilisers
-// have gains of 0.3 and more: a few px per rad are something else.
+// Derivative of that angle by a change of the stabiliser.
+Eigen::Matrix2Xd ByChange(const EffectSetup& setup, const OpticalStabiliser& stabiliser,
+                          double step,
+                          const std::function<void(double, OpticalStabiliser*)>& change) {
+  OpticalStabiliser more = stabiliser, less = stabiliser;
+  change(step, &more);
+  change(-step, &less);
+  return (AngleAtSamples(setup, more) - AngleAtSamples(setup, less)) / (2.0 * step);
+}
+
+// By time, where the lens follows late [rad/s].
+Eigen::Matrix2Xd ByTime(const std::vector<double>& times_s, const Eigen::Matrix2Xd& angle) {
+  Eigen::Matrix2Xd rate = Eigen::Matrix2Xd::Zero(2, angle.cols());
+  for (Eigen::Index i = 1; i + 1 < angle.cols(); ++i) {
+    const double from_s = times_s[static_cast<size_t>(i) - 1];
+    rate.col(i) =
+        (angle.col(i + 1) - angle.col(i - 1)) / (times_s[static_cast<size_t>(i) + 1] - from_s);
+  }
+  return rate;
+}
+
+std::vector<EffectParameter> ParametersOf(const OpticalStabiliser& stabiliser) {
+  // Stabilisers have gains of 0.3 and more: a few px per rad are something else. The rest of a
+  // lens's shift, 500 px per rad or so: a corner and a stop within a factor of 1.6 of the shape, a
+  // lag of 5 ms, and a tenth of it across, or more about x than about y.
+  constexpr double kShift = 500.0, kAnother = 250.0, kLag = 2.5, kTenth = 50.0, kAny = 1e4;
+  constexpr double kOffCentre_px = 5.0;
+  std::vector<EffectParameter> parameters = {{"shift_per_rad", "px/rad", kShift, 30.0, kAny},
+                                             {"corner_change", "px/rad", kAnother, -kAny, kAny},
+                                             {"lag", "px s/rad", kLag, -kAny, kAny},
+                                             {"cross_axis", "px/rad", kTenth, -kAny, kAny},
+                                             {"axis_difference", "px/rad", kTenth, -kAny, kAny}};
+  if (std::isfinite(stabiliser.travel_rad)) {
+    parameters.push_back({"stop_change", "px/rad", kAnother, -kAny, kAny});
+    parameters.push_back({"stop_centre_x", "px", kOffCentre_px, -kAny, kAny});
+    parameters.push_back({"stop_centre_y", "px", kOffCentre_px, -kAny, kAny});
+  }
+  return parameters;
+}
+
+// The picture shifts in proportion to the stabilised angle, by gain * f [px per rad]. Corner and
+// stop of the shape are not quite those of the lens: to first order, the shift times the relative
+// (logarithmic) change of each is a parameter as well.
 class OpticalStabilisation final : public Effect {
  public:
   OpticalStabilisation(const EffectSetup& setup, const OpticalStabiliser& stabiliser)
-      : Effect({{"shift_per_rad", "px/rad", 500.0, 30.0, 1e4}}),
+      : Effect(ParametersOf(stabiliser)),
         gyro_(setup.gyro),
         delays_s_(setup.frame_delays_s),
         readout_s_(setup.readout_s),
         found_px_per_rad_(setup.stabiliser ? setup.stabiliser_px_per_rad : 0.0),
-        angle_(AngleAtSamples(setup, stabiliser)) {
+        angles_({AngleAtSamples(setup, stabiliser)}) {
+    constexpr double kLog = 0.02, kOffCentre = 0.001;
+    angles_.push_back(ByChange(setup, stabiliser, kLog, [](double step, OpticalStabiliser* s) {
+      s->corner_hz *= std::exp(step);
+    }));
+    angles_.push_back(-ByTime(gyro_->times_s, angles_[0]));
+    angles_.push_back(Eigen::Matrix2Xd(2, angles_[0].cols()));
+    angles_.back() << -angles_[0].row(1), angles_[0].row(0);
+    angles_.push_back(Eigen::Vector2d(1.0, -1.0).asDiagonal() * angles_[0]);
+    if (std::isfinite(stabiliser.travel_rad)) {
+      angles_.push_back(ByChange(setup, stabiliser, kLog, [](double step, OpticalStabiliser* s) {
+        s->travel_rad *= std::exp(step);
+      }));
+      for (const Eigen::Index axis : {0, 1}) {
+        angles_.push_back(
+            ByChange(setup, stabiliser, kOffCentre,
+                     [axis](double step, OpticalStabiliser* s) { s->centre_rad[axis] += step; }));
+      }
+    }
     for (const FrameTime& frame : setup.frames) stamps_s_.push_back(frame.stamp_s);
     delays_s_.resize(stamps_s_.size(), setup.delay_s);
   }
@@ -46,43 +105,61 @@ class OpticalStabilisation final : public Effect {
     if (next == times_s.begin() || next == times_s.end()) return;
     const Eigen::Index i = next - times_s.begin();
     const double u = (t - *(next - 1)) / (*next - *(next - 1));
-    const Eigen::Vector2d angle = (1.0 - u) * angle_.col(i - 1) + u * angle_.col(i);
-    columns(kCx, 0) = angle.y();
-    columns(kCy, 0) = -angle.x();
+    for (int k = 0; k < size(); ++k) {
+      const Eigen::Matrix2Xd& at = angles_[static_cast<size_t>(k)];
+      const Eigen::Vector2d angle = (1.0 - u) * at.col(i - 1) + u * at.col(i);
+      columns(kCx, k) = angle.y();
+      columns(kCy, k) = -angle.x();
+    }
   }
   bool depends_on_calibration() const override { return true; }
-  void SetStart(double* values) const override { *values = found_px_per_rad_; }
+  void SetStart(double* values) const override { values[0] = found_px_per_rad_; }
 
  private:
   const std::shared_ptr<const SensorSamples> gyro_;
   std::vector<double> stamps_s_, delays_s_;  // of the frames
   const double readout_s_;
   const double found_px_per_rad_;
-  const Eigen::Matrix2Xd angle_;
+  std::vector<Eigen::Matrix2Xd> angles_;  // of each parameter
 };
 
-// That which the start has found, if it has. Else several: where the lens reaches no stop, one is
-// as good as another.
+// That which the start has found, if it has. Else those of a Pixel: without its stop, and with it,
+// where the motion is so large.
 std::vector<std::string> ShapesFor(const EffectSetup& setup) {
-  // Those of phones go 1 to 2 degrees; the lens is at its stop for at least so much of the time.
-  constexpr double kAtStop = 0.05;
+  const OpticalStabiliser pixel = {0.5, 0.025};
+  constexpr double kAtStop = 0.05;  // the lens is there for at least so much of the time
   if (!setup.has_pixels || setup.lens_is_held) return {};
   if (setup.stabiliser) return {NameOf(*setup.stabiliser)};
-  std::vector<std::string> shapes = {"0.15", "1", "0.5"};
-  const Eigen::RowVectorXd size =
-      AngleAtSamples(setup, {0.5, std::numeric_limits<double>::infinity()}).colwise().norm();
-  for (const char* stop : {"0.5/0.015", "0.5/0.04", "0.5/0.025"}) {
-    const OpticalStabiliser s = *StabiliserOf(stop);
-    const auto beyond = static_cast<double>((size.array() > s.travel_rad).count());
-    if (beyond > kAtStop * static_cast<double>(size.size())) shapes.emplace_back(stop);
-  }
+  const OpticalStabiliser without = {pixel.corner_hz};
+  std::vector<std::string> shapes = {NameOf(without)};
+  const Eigen::RowVectorXd size = AngleAtSamples(setup, without).colwise().norm();
+  const auto beyond = static_cast<double>((size.array() > pixel.travel_rad).count());
+  if (beyond > kAtStop * static_cast<double>(size.size())) shapes.push_back(NameOf(pixel));
   return shapes;
+}
+
+// The stabiliser that a fit says: its shape with the changes that the values are. A fit far from
+// the lens is no measure of it, so that changes are bounded, and it is asked again from there.
+std::string ShapeByFit(const std::string& shape, double* values) {
+  constexpr double kMostLog = 0.5;
+  constexpr double kLeastShift_px = 1.0;  // per rad
+  std::optional<OpticalStabiliser> s = StabiliserOf(shape);
+  if (!s || !(values[0] > kLeastShift_px)) return shape;
+  const auto factor = [&](double change) {
+    return std::exp(std::clamp(change / values[0], -kMostLog, kMostLog));
+  };
+  s->corner_hz = std::clamp(s->corner_hz * factor(values[1]), 0.05, 5.0);
+  values[1] = 0.0;
+  if (std::isfinite(s->travel_rad)) {
+    s->travel_rad = std::clamp(s->travel_rad * factor(values[5]), 0.005, 0.2);
+    values[5] = 0.0;
+  }
+  return NameOf(*s);
 }
 
 }  // namespace
 
-// Shapes: the corner frequency in Hz, and how far the lens goes in rad, if it has stops. That of a
-// Pixel is the last, which --effects=optical_stabilisation takes.
+// Shapes: the corner frequency in Hz, and how far the lens goes in rad, if it has stops.
 EffectEntry OpticalStabilisationEntry() {
   EffectEntry entry = {"optical_stabilisation", ModelPart::kLens,
                        "the lens moves against fast rotation, so that the picture turns less "
@@ -91,6 +168,7 @@ EffectEntry OpticalStabilisationEntry() {
                        "function of time, and only slow rotation shows the focal length"};
   entry.leads_astray = true;
   entry.shapes = ShapesFor;
+  entry.shape_by_fit = ShapeByFit;
   entry.make = [](const EffectSetup& setup,
                   const std::string& shape) -> std::shared_ptr<const Effect> {
     const std::optional<OpticalStabiliser> stabiliser = StabiliserOf(shape);

@@ -261,7 +261,7 @@ class Loop {
     if (!in_.start.effects || (item.entry->found_at_start && item.usual_sigma == 0.0)) return false;
     const auto& asked = in_.start.effects->items();
     return std::any_of(asked.begin(), asked.end(), [&](const EffectSet::Item& a) {
-      return a.entry == item.entry && a.shape == item.shape;
+      return a.entry == item.entry && (a.shape == item.shape || a.entry->shape_by_fit);
     });
   }
 

@@ -12,7 +12,6 @@
 namespace camgyro {
 namespace {
 
-using ::testing::Contains;
 using ::testing::ElementsAre;
 
 // 10 s about the camera's x and y axes at 1 Hz, a quarter of a period apart, with this amplitude: a
@@ -32,14 +31,18 @@ EffectSetup Circling(double angle_rad) {
   return setup;
 }
 
-// Of the picture by the effect, at 5 s, per unit of its parameter.
-Eigen::Vector2d ShiftOf(const std::string& shape, const EffectSetup& setup) {
+// Of the picture by the effect, at 5 s, per unit of each of its parameters (columns).
+Eigen::Matrix2Xd ShiftsOf(const std::string& shape, const EffectSetup& setup) {
   const EffectSet set = MakeEffects("optical_stabilisation:" + shape, setup).value();
   Eigen::Matrix<double, kLensSize, Eigen::Dynamic> columns =
-      Eigen::Matrix<double, kLensSize, Eigen::Dynamic>::Zero(kLensSize, 1);
+      Eigen::Matrix<double, kLensSize, Eigen::Dynamic>::Zero(kLensSize, set.size());
   const Observation middle = {Eigen::Vector2d(320.0, 240.0), setup.size_px, setup.frames[100]};
   set.items().front().effect->ChangeLens(middle, columns);
-  return {columns(kCx, 0), columns(kCy, 0)};
+  return columns.middleRows<2>(kCx);
+}
+
+Eigen::Vector2d ShiftOf(const std::string& shape, const EffectSetup& setup) {
+  return ShiftsOf(shape, setup).col(0);
 }
 
 TEST(OpticalStabilisation, TheLensGoesNoFurtherThanItsStop) {
@@ -50,13 +53,74 @@ TEST(OpticalStabilisation, TheLensGoesNoFurtherThanItsStop) {
   EXPECT_NEAR(ShiftOf("0.5/0.07", Circling(0.06)).norm(), free, 0.02 * free);
 }
 
-TEST(OpticalStabilisation, StopsAreOfferedWhereTheMotionReachesThem) {
+enum { kShift, kCorner, kLag, kCross, kDifference, kStop, kCentreX, kCentreY, kWithStop };
+
+// A lens of another corner or stop than the shape's is the shape with changes, to first order.
+TEST(OpticalStabilisation, ChangesOfCornerAndStopAreParameters) {
+  constexpr double kLog = 0.03, kBound = kLog * kLog;
+  const EffectSetup setup = Circling(0.06);
+  const auto is_near = [&](const std::string& other, const std::string& shape, int parameter) {
+    const Eigen::Matrix2Xd shifts = ShiftsOf(shape, setup);
+    const Eigen::Vector2d moved = shifts.col(kShift) + kLog * shifts.col(parameter);
+    const Eigen::Vector2d is = ShiftOf(other, setup);
+    EXPECT_GT((is - shifts.col(kShift)).norm(), 3.0 * kBound * is.norm());
+    EXPECT_LT((is - moved).norm(), kBound * is.norm());
+  };
+  ASSERT_EQ(ShiftsOf("0.5", setup).cols(), kStop);
+  ASSERT_EQ(ShiftsOf("0.5/0.025", setup).cols(), kWithStop);
+  is_near(std::to_string(0.5 * std::exp(kLog)), "0.5", kCorner);
+  is_near("0.5/" + std::to_string(0.025 * std::exp(kLog)), "0.5/0.025", kStop);
+}
+
+// A lens that is late is where it was before, one with other axes is turned, and one whose stops
+// are off the centre ends where they are.
+TEST(OpticalStabilisation, LagAxesAndCentreAreParameters) {
+  const EffectSetup setup = Circling(0.06);
+  EffectSetup later = setup;
+  constexpr double kLate_s = 0.005;
+  for (FrameTime& frame : later.frames) frame.stamp_s += kLate_s;
+  for (const std::string shape : {"0.5", "0.5/0.025"}) {
+    const Eigen::Matrix2Xd shifts = ShiftsOf(shape, setup);
+    const Eigen::Vector2d shift = shifts.col(kShift);
+    const Eigen::Vector2d before =
+        ShiftOf(shape, later) + kLate_s * ShiftsOf(shape, later).col(kLag);
+    EXPECT_LT((before - shift).norm(), 0.001 * shift.norm()) << shape;
+    EXPECT_LT((shifts.col(kCross) - Eigen::Vector2d(-shift.y(), shift.x())).norm(), 1e-9);
+    EXPECT_LT((shifts.col(kDifference) - Eigen::Vector2d(-shift.x(), shift.y())).norm(), 1e-9);
+  }
+  // 5 s about x against its stop, and back: there, the lens is as far from the centre as it goes.
+  auto there_and_back = std::make_shared<SensorSamples>(*setup.gyro);
+  for (Eigen::Index i = 0; i < there_and_back->values.cols(); ++i) {
+    there_and_back->values.col(i) << (i < 1001 ? 0.3 : -0.3), 0.0, 0.0;
+  }
+  EffectSetup at_stop = setup;
+  at_stop.gyro = there_and_back;
+  const Eigen::Matrix2Xd shifts = ShiftsOf("0.5/0.025", at_stop);
+  EXPECT_LT((shifts.col(kShift) - Eigen::Vector2d(0.0, -0.025)).norm(), 1e-9);
+  EXPECT_LT((shifts.col(kCentreX) - Eigen::Vector2d(0.0, -1.0)).norm(), 1e-6);
+  // It slides along the stop to where it is pressed against it: by the turn, less what it forgets.
+  const double pressed = 1.0 - 2.0 * M_PI * 0.5 * 0.025 / 0.3;
+  EXPECT_LT((shifts.col(kCentreY) - Eigen::Vector2d(pressed, 0.0)).norm(), 1e-3);
+}
+
+TEST(OpticalStabilisation, AFitSaysTheShape) {
   const EffectEntry& entry = *FindEffect("optical_stabilisation");
-  EXPECT_THAT(entry.shapes(EffectSetup()), ElementsAre("0.15", "1", "0.5"));  // no gyro at all
-  EXPECT_THAT(entry.shapes(Circling(0.01)), ElementsAre("0.15", "1", "0.5"));
-  EXPECT_THAT(entry.shapes(Circling(0.02)), ElementsAre("0.15", "1", "0.5", "0.5/0.015"));
-  EXPECT_EQ(entry.shapes(Circling(0.06)).back(), "0.5/0.025");
-  EXPECT_THAT(entry.shapes(Circling(0.06)), Contains("0.5/0.04"));
+  std::vector<double> values = {500.0, 100.0, 1.0, 2.0, 3.0, -50.0, 4.0, 5.0};
+  // times exp(0.2), exp(-0.1)
+  EXPECT_EQ(entry.shape_by_fit("0.5/0.025", values.data()), "0.611/0.0226");
+  EXPECT_THAT(values, ElementsAre(500.0, 0.0, 1.0, 2.0, 3.0, 0.0, 4.0, 5.0));
+  values = {500.0, 1000.0, 1.0, 2.0, 3.0};
+  EXPECT_EQ(entry.shape_by_fit("0.5", values.data()), "0.824");  // times exp(0.5) at most
+  values = {0.1, 100.0, 1.0, 2.0, 3.0};
+  EXPECT_EQ(entry.shape_by_fit("0.5", values.data()), "0.5");
+  EXPECT_THAT(values, ElementsAre(0.1, 100.0, 1.0, 2.0, 3.0));
+}
+
+TEST(OpticalStabilisation, AStopIsOfferedWhereTheMotionReachesIt) {
+  const EffectEntry& entry = *FindEffect("optical_stabilisation");
+  EXPECT_THAT(entry.shapes(EffectSetup()), ElementsAre("0.5"));  // no gyro at all
+  EXPECT_THAT(entry.shapes(Circling(0.02)), ElementsAre("0.5"));
+  EXPECT_THAT(entry.shapes(Circling(0.06)), ElementsAre("0.5", "0.5/0.025"));
   EffectSetup attitudes = Circling(0.06);
   attitudes.has_pixels = false;
   EXPECT_TRUE(entry.shapes(attitudes).empty());
@@ -72,9 +136,9 @@ TEST(OpticalStabilisation, HasTheShapeThatTheStartHasFound) {
   setup.stabiliser = OpticalStabiliser{0.62, 0.031};
   setup.stabiliser_px_per_rad = 432.0;
   EXPECT_THAT(entry.shapes(setup), ElementsAre("0.62/0.031"));
-  double start = 0.0;
-  entry.make(setup, "0.62/0.031")->SetStart(&start);
-  EXPECT_EQ(start, 432.0);
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(kWithStop);
+  entry.make(setup, "0.62/0.031")->SetStart(start.data());
+  EXPECT_EQ(start, 432.0 * Eigen::VectorXd::Unit(kWithStop, kShift));
 }
 
 TEST(OpticalStabilisation, RefusesWhatIsNoShape) {

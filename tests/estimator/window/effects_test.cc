@@ -117,7 +117,11 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"focal_drift:linear", "effects.focal_drift={rate_px_s: 2}", {2.0}},
         Case{"optical_stabilisation:0.5",
              "effects.optical_stabilisation={gain: 0.4,corner_hz: 0.5}",
-             {0.4 * 650.0}},
+             {0.4 * 650.0, 0.0, 0.0, 0.0, 0.0}},
+        // Of another shape, to first order.
+        Case{"optical_stabilisation:0.45",
+             "effects.optical_stabilisation={gain: 0.4,corner_hz: 0.5}",
+             {0.4 * 650.0, 0.4 * 650.0 * std::log(0.5 / 0.45), 0.0, 0.0, 0.0}},
         Case{"clock_skew", "effects.clock_skew={ppm: 400}", {400.0}},
         Case{"delay_step:5", "effects.delay_step={time_s: 5.0,step_s: 0.01}", {0.01}},
         Case{"readout_direction", "effects.readout_direction={columns: true}", {0.02}, 8.0},
