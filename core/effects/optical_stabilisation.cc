@@ -43,6 +43,9 @@ Eigen::Matrix2Xd ByTime(const std::vector<double>& times_s, const Eigen::Matrix2
   return rate;
 }
 
+// Of the parameters, those that the shape's numbers take up.
+enum { kOfShift = 0, kOfCorner = 1, kOfStop = 5 };
+
 std::vector<EffectParameter> ParametersOf(const OpticalStabiliser& stabiliser) {
   // Stabilisers have gains of 0.3 and more: a few px per rad are something else. The rest of a
   // lens's shift, 500 px per rad or so: a corner and a stop within a factor of 1.6 of the shape, a
@@ -64,7 +67,8 @@ std::vector<EffectParameter> ParametersOf(const OpticalStabiliser& stabiliser) {
 
 // The picture shifts in proportion to the stabilised angle, by gain * f [px per rad]. Corner and
 // stop of the shape are not quite those of the lens: to first order, the shift times the relative
-// (logarithmic) change of each is a parameter as well.
+// (logarithmic) change of each is a parameter as well. So are a lag, axes that are turned or of
+// different gains, and stops that are off the centre, all of which the lens of a Pixel has.
 class OpticalStabilisation final : public Effect {
  public:
   OpticalStabilisation(const EffectSetup& setup, const OpticalStabiliser& stabiliser)
@@ -113,7 +117,7 @@ class OpticalStabilisation final : public Effect {
     }
   }
   bool depends_on_calibration() const override { return true; }
-  void SetStart(double* values) const override { values[0] = found_px_per_rad_; }
+  void SetStart(double* values) const override { values[kOfShift] = found_px_per_rad_; }
 
  private:
   const std::shared_ptr<const SensorSamples> gyro_;
@@ -144,15 +148,15 @@ std::string ShapeByFit(const std::string& shape, double* values) {
   constexpr double kMostLog = 0.5;
   constexpr double kLeastShift_px = 1.0;  // per rad
   std::optional<OpticalStabiliser> s = StabiliserOf(shape);
-  if (!s || !(values[0] > kLeastShift_px)) return shape;
+  if (!s || !(values[kOfShift] > kLeastShift_px)) return shape;
   const auto factor = [&](double change) {
-    return std::exp(std::clamp(change / values[0], -kMostLog, kMostLog));
+    return std::exp(std::clamp(change / values[kOfShift], -kMostLog, kMostLog));
   };
-  s->corner_hz = std::clamp(s->corner_hz * factor(values[1]), 0.05, 5.0);
-  values[1] = 0.0;
+  s->corner_hz = std::clamp(s->corner_hz * factor(values[kOfCorner]), 0.05, 5.0);
+  values[kOfCorner] = 0.0;
   if (std::isfinite(s->travel_rad)) {
-    s->travel_rad = std::clamp(s->travel_rad * factor(values[5]), 0.005, 0.2);
-    values[5] = 0.0;
+    s->travel_rad = std::clamp(s->travel_rad * factor(values[kOfStop]), 0.005, 0.2);
+    values[kOfStop] = 0.0;
   }
   return NameOf(*s);
 }
