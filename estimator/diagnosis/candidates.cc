@@ -1,7 +1,9 @@
 #include "estimator/diagnosis/candidates.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "estimator/astray.h"
 #include "estimator/diagnosis/score_test.h"
 #include "estimator/diagnosis/thresholds.h"
 
@@ -66,6 +68,23 @@ void AddEffect(const Candidate& candidate, Calibration* calibration) {
   calibration->effect_values =
       Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
   calibration->effect_covariance = Eigen::MatrixXd::Zero(set->size(), set->size());
+}
+
+void NameEffects(const Calibration& begin, const Calibration& fit,
+                 std::vector<std::string>* names) {
+  if (!fit.effects) return;
+  for (const EffectSet::Item& item : fit.effects->items()) {
+    const bool found = item.entry->found_at_start && item.usual_sigma == 0.0 && IsSeen(item, fit);
+    const auto is_same = [&](const EffectSet::Item& other) {
+      return other.entry == item.entry && (other.shape == item.shape || other.entry->shape_by_fit);
+    };
+    if (!found && begin.effects &&
+        std::any_of(begin.effects->items().begin(), begin.effects->items().end(), is_same)) {
+      continue;
+    }
+    const bool known = std::count(names->begin(), names->end(), item.entry->name) > 0;
+    if (!known || item.entry->adds_up) names->push_back(item.entry->name);
+  }
 }
 
 Eigen::VectorXd PriorInformation(const Prior& prior, const EffectSet* model,

@@ -46,6 +46,12 @@ std::vector<Candidate> MissingFrameTimes(const Calibration& model, const EffectS
 // they add up. Values carry over.
 void AddEffect(const Candidate& candidate, Calibration* calibration);
 
+// Appends the names of the effects that the data show: those that the loop has added to the model
+// it began with, and those that the start took into that one and the fit sees (IsSeen). The others
+// are in the model since the user has named them, since devices usually have them, or since the
+// start leaves something open, as of a gyro's clock that was found behind its stamps.
+void NameEffects(const Calibration& begin, const Calibration& fit, std::vector<std::string>* names);
+
 // 1 / sigma^2 of the priors: state, effects of the model (may be null), candidates.
 Eigen::VectorXd PriorInformation(const Prior& prior, const EffectSet* model,
                                  const EffectSet& candidates);

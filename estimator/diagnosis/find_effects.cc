@@ -242,27 +242,13 @@ class Loop {
           return fits_.ScoresOf(fits_.shares().choice, calibration, std::move(candidates),
                                 fit_.quality.noise_px);
         });
-    if (!fit_.calibration.effects) return;
-    for (const auto& item : fit_.calibration.effects->items()) {
-      if (WasAsked(item)) continue;
-      const bool known = std::count(out->effects.begin(), out->effects.end(), item.entry->name) > 0;
-      if (!known || item.entry->adds_up) out->effects.push_back(item.entry->name);
-    }
+    NameEffects(in_.start, fit_.calibration, &out->effects);
   }
 
   EffectSetup Setup() const {
     EffectSetup setup = MakeEffectSetup(*in_.recording, fit_.calibration);
     TellOfStabiliser(in_.found, &setup);
     return setup;
-  }
-
-  // It is in the model since the user has named it, and not since the data show it.
-  bool WasAsked(const EffectSet::Item& item) const {
-    if (!in_.start.effects || (item.entry->found_at_start && item.usual_sigma == 0.0)) return false;
-    const auto& asked = in_.start.effects->items();
-    return std::any_of(asked.begin(), asked.end(), [&](const EffectSet::Item& a) {
-      return a.entry == item.entry && (a.shape == item.shape || a.entry->shape_by_fit);
-    });
   }
 
   // share: of the round. How many rounds follow, nobody knows: as many as there were, let us say.
