@@ -138,19 +138,23 @@ class CalibrationJob {
     return {};
   }
 
-  // The online pass, so far that the refinement can start from it, or to its end.
-  Status Window() {
+  void MakePass(const PairSelection& of, const Calibration& start,
+                std::optional<OnlinePass>* pass) const {
     SlidingWindowOptions window_options = options_.window;
     window_options.graph = graph_options_;
+    pass->emplace(recording_, input_, of, start, report_.prior, window_options);
+  }
+
+  // The online pass, so far that the refinement can start from it, or to its end.
+  Status Window() {
     const PairSelection selection = SelectPairs(recording_, kGapLimitsOnline);
-    const auto pass_of = [&](const PairSelection& of, std::optional<OnlinePass>* pass) {
-      pass->emplace(recording_, input_, of, estimate_, report_.prior, window_options);
-    };
-    pass_of(selection, &online_);
+    MakePass(selection, estimate_, &online_);
     // From a poor start, as with a strong lens that nothing declares, a few short pairs find the
     // way more often than many long ones.
     std::optional<OnlinePass> short_pass;
-    if (selection.far) pass_of(SelectPairs(recording_, kGapLimitsOfPoorStart).near(), &short_pass);
+    if (selection.far) {
+      MakePass(SelectPairs(recording_, kGapLimitsOfPoorStart).near(), estimate_, &short_pass);
+    }
     OnlinePass& first = short_pass ? *short_pass : *online_;
     if (const Status done = first.RunUntilSettled(progress_); !done) return done;
     if (first.has_estimate()) {
@@ -267,8 +271,6 @@ class CalibrationJob {
           Format("the recording is long: %zu of %zu pairs, those that tell most, are refined",
                  refined_pairs_.size(), input_.pairs.size()));
     }
-    Status online;
-    Beside rest_of_window([&] { online = FinishWindow(); });
     Calibration from = estimate_;
     if (from.effects != nullptr &&
         std::any_of(from.effects->items().begin(), from.effects->items().end(),
@@ -278,7 +280,14 @@ class CalibrationJob {
       from = SettleEffects(recording_, *first, [&](const Refined& fit) {
                return RefineFrom(fit, refined_pairs_, refinement);
              }).calibration;
+      if (online_) {  // all of it with these effects, not with those of the start
+        Calibration again = from_start_;
+        again.effects = from.effects;
+        MakePass(SelectPairs(recording_, kGapLimitsOnline), again, &online_);
+      }
     }
+    Status online;
+    Beside rest_of_window([&] { online = FinishWindow(); });
     Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
     rest_of_window.Wait();
     if (!online) return online;

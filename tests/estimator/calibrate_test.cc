@@ -140,6 +140,11 @@ TEST(CalibrateRecording, MakesEffectsAnewThatDependOnTheDelay) {
   const StateVector error = ErrorInSigmas(report->calibration, s.truth);
   EXPECT_LT(error.cwiseAbs().maxCoeff(), 5.0) << error.transpose();
   EXPECT_LT(report->calibration.sigma()[kStateDelay], 5e-4);
+  // The online pass has them as well, in the shape that the fit has found.
+  ASSERT_TRUE(report->online && report->online->effects);
+  const std::string& shape = report->calibration.effects->items().front().shape;
+  EXPECT_NE(shape, "0.5");
+  EXPECT_EQ(report->online->effects->items().front().shape, shape);
 }
 
 // What the stabiliser does follows the time of the frame, whatever else shifts that.
