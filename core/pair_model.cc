@@ -7,26 +7,51 @@
 
 namespace camgyro {
 
+namespace {
+
+// What effects add to the delay at a pixel [s].
+double TimeChange(const PairEffects& effects, const Observation& observation) {
+  if (effects.set == nullptr) return 0.0;
+  EffectSet::Change change;
+  effects.set->ChangeObservation(observation, &change);
+  return change.time.row(0).dot(
+      Eigen::Map<const Eigen::VectorXd>(effects.values, effects.set->size()));
+}
+
+}  // namespace
+
 std::pair<double, double> ExposureSpan(const ShutterParameters& shutter,
                                        const Eigen::Vector2d& size_px, const PairEffects& effects,
                                        const FrameTime& frame_a, const FrameTime& frame_b) {
   double first = std::numeric_limits<double>::infinity(), last = -first;
-  EffectSet::Change change;
   for (const FrameTime& frame : {frame_a, frame_b}) {
     for (const Eigen::Vector2d& part : {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(1.0, 0.0),
                                         Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(1.0, 1.0)}) {
       const Eigen::Vector2d px = part.cwiseProduct(size_px);
-      double time_s = RowTimeGyroS(frame.stamp_s + frame.offset_s, shutter, part.y(), 1.0);
-      if (effects.set != nullptr) {
-        effects.set->ChangeObservation({px, size_px, frame}, &change);
-        time_s += change.time.row(0).dot(
-            Eigen::Map<const Eigen::VectorXd>(effects.values, effects.set->size()));
-      }
+      const double time_s = RowTimeGyroS(frame.stamp_s + frame.offset_s, shutter, part.y(), 1.0) +
+                            TimeChange(effects, {px, size_px, frame});
       first = std::min(first, time_s);
       last = std::max(last, time_s);
     }
   }
   return {first, last};
+}
+
+Scan ScanOf(const ShutterParameters& shutter, const Eigen::Vector2d& size_px,
+            const PairEffects& effects, const FrameTime& frame) {
+  const double rows_s = shutter[kReadout];
+  const double columns_s = TimeChange(effects, {{size_px.x(), 0.5 * size_px.y()}, size_px, frame}) -
+                           TimeChange(effects, {{0.0, 0.5 * size_px.y()}, size_px, frame});
+  if (std::abs(columns_s) > std::abs(rows_s)) return {columns_s, {1.0, rows_s / columns_s}};
+  if (rows_s == 0.0) return {};
+  return {rows_s, {columns_s / rows_s, 1.0}};
+}
+
+double ColumnReadoutOf(const Calibration& calibration) {
+  const Scan scan =
+      ScanOf(ShutterOf(calibration), Eigen::Vector2d(calibration.width_px, calibration.height_px),
+             calibration.pair_effects(), FrameTime());
+  return scan.readout_s * scan.shares.x();
 }
 
 Eigen::Vector3d TrueRate(const PairEffects& effects, double time_gyro_s,

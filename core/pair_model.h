@@ -5,6 +5,8 @@
 #define CAMGYRO_CORE_PAIR_MODEL_H_
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/calibration.h"
@@ -32,6 +34,27 @@ inline double RowTimeGyroS(double frame_time_s, const ShutterParameters& shutter
 std::pair<double, double> ExposureSpan(const ShutterParameters& shutter,
                                        const Eigen::Vector2d& size_px, const PairEffects& effects,
                                        const FrameTime& frame_a, const FrameTime& frame_b);
+
+// How a picture is read: how long that takes [s], and which shares of it pass from the first to the
+// last column, and row. The larger share is 1; effects on time may read columns
+// (readout_direction).
+struct Scan {
+  double readout_s = 0.0;
+  Eigen::Vector2d shares{0.0, 1.0};
+};
+Scan ScanOf(const ShutterParameters& shutter, const Eigen::Vector2d& size_px,
+            const PairEffects& effects, const FrameTime& frame);
+
+// First to last column, beside the readout of rows [s]: zero but with readout_direction.
+double ColumnReadoutOf(const Calibration& calibration);
+// Pictures are read column by column, which not every program here knows, if that takes longer than
+// rows do, and more than what shows (1 ms: half a pixel of a turn by 1 rad/s).
+inline bool ReadsColumns(double readout_s, double column_readout_s) {
+  return std::abs(column_readout_s) > std::max(1e-3, std::abs(readout_s));
+}
+inline constexpr char kReadsColumns[] =
+    "the pictures are read column by column (readout_direction), expected row by row; turn them by "
+    "90 degrees, and calibrate those";
 
 // The true rate behind a gyro reading, less its bias, in view of the effects [rad/s].
 Eigen::Vector3d TrueRate(const PairEffects& effects, double time_gyro_s,

@@ -32,16 +32,18 @@ using BendVector = Eigen::Matrix<double, 6, 1>;
 //
 //   r_i = Robustify( tau_i . n_i / sigma_i ),  n_i = (R_i f_i) x (R'_i f'_i)          eq. (4)
 //   tau_i = tau + s_i turn + c_i bow
-//   s_i = (v_i + v'_i) / 2h - 1/2,   d_i = (v'_i - v_i) / h,   c_i = d_i + rho (6 s_i^2 + d_i^2 /
-//   2)
+//   s_i = (p_i + p'_i) / 2 - 1/2,   d_i = p'_i - p_i,   c_i = d_i + rho (6 s_i^2 + d_i^2 / 2)
 //
 // Eq. (4) takes one translation direction for the whole pair. With a rolling shutter every match is
 // joined by a stretch of the path of its own. From u to u' on a path with velocity v, acceleration
 // a and jerk j at the middle of the pair it goes (u' - u) (v + a (u + u') / 2 + j (u^2 + u u' +
 // u'^2) / 6): with u, u' by the rows, and up to a length that changes nothing, that is tau_i, with
-// turn = a t_r / |v|, bow = j t_r T / 12 |v| and rho = t_r / T, T the time between the frames. turn
-// and bow are no products with t_r here: the prior of a factor of t_r would pull on t_r. (Without
-// bow, the steps of somebody who runs leave b_y, c_y, t_r, t_d 0.8 to 0.4 sigmas off at 0.5 px.)
+// p = v / h, turn = a t_r / |v|, bow = j t_r T / 12 |v| and rho = t_r / T, T the time between the
+// frames. turn and bow are no products with t_r here: the prior of a factor of t_r would pull on
+// t_r. (Without bow, the steps of somebody who runs leave b_y, c_y, t_r, t_d 0.8 to 0.4 sigmas off
+// at 0.5 px.) Where columns are read as well or instead, p is how far the readout has come at a
+// pixel, and t_r what takes longer (Scan; with p by the rows, columns of 20 ms leave c_x and q_y of
+// somebody who walks 3 to 6 sigmas off).
 //
 // Parameters  lens         kLensSize     LensParameters
 //             shutter      kShutterSize  t_r [s], t_d [s]
@@ -72,8 +74,10 @@ class CoplanarityPlane final : public ceres::CostFunction {
 
   // s_i and c_i of a match: by how much turn and bow move its direction.
   static Eigen::Vector2d BendShares(const PairMeasurement& pair, const Match& match) {
-    const double s = 0.5 * (match.px_a.y() + match.px_b.y()) / pair.size_px.y() - 0.5;
-    const double d = (match.px_b.y() - match.px_a.y()) / pair.size_px.y();
+    const Eigen::Vector2d mean = 0.5 * (match.px_a + match.px_b).cwiseQuotient(pair.size_px);
+    const Eigen::Vector2d moved = (match.px_b - match.px_a).cwiseQuotient(pair.size_px);
+    const double s = pair.scan_shares.dot((mean.array() - 0.5).matrix());
+    const double d = pair.scan_shares.dot(moved);
     return {s, d + pair.readout_over_gap * (6.0 * s * s + 0.5 * d * d)};
   }
 

@@ -26,7 +26,9 @@ struct PairMeasurement {
   double sigma = 1.0;
   MatchNoise noise = MatchNoise::kBothImages;
   double robust_threshold = 0.0;  // in sigmas (of a rotation: of each axis); 0: no loss
-  double readout_over_gap = 0.0;  // t_r over the time between the frames, of CoplanarityPlane
+  // Of CoplanarityPlane: how the pictures are read (Scan), over the time between the frames.
+  double readout_over_gap = 0.0;
+  Eigen::Vector2d scan_shares{0.0, 1.0};
   const Lens* lens = nullptr;
   // Jacobians by the other lens parameters are zero, for solves that hold them; with effects: all.
   LensDerivatives by_lens = LensDerivatives::kAll;

@@ -170,7 +170,8 @@ void FillOwn(const PairResidual& residual, const LinearPair& linear, const Timed
   }
   if (of_direction > 0 && all.free_turn_rad_s > 0.0) {
     s->bend_column = 2;
-    s->free_bend = BendSigma(all.free_turn_rad_s, c.readout_s, pair.time_b_s - pair.time_a_s)
+    const Scan scan = ScanOf(ShutterOf(c), m.size_px, c.pair_effects(), m.frame_a);
+    s->free_bend = BendSigma(all.free_turn_rad_s, scan.readout_s, pair.time_b_s - pair.time_a_s)
                        .cwiseAbs2()
                        .cwiseInverse();
   }

@@ -265,10 +265,11 @@ void PairGraph::AddDirection(int64_t id, Pair* pair) {
   graph_.AddBlock(DirectionBlock(id), {Geometry::kDirection, plane.tau, {}});
   graph_.AddBlock(BendBlock(id), {Geometry::kEuclidean, plane.bend, {}});
   PairMeasurement& m = *pair->measurement;
-  const double readout_s = graph_.value(kShutterBlock)[kReadout];
+  const Scan scan = ScanOf(graph_.value(kShutterBlock), m.size_px, EffectsNow(), m.frame_a);
   const double gap_s = m.frame_b.stamp_s - m.frame_a.stamp_s;
-  m.readout_over_gap = readout_s / gap_s;
-  pair->bend_sigma_rad = BendSigma(turn_sigma_rad_s_, readout_s, gap_s);
+  m.scan_shares = scan.shares;
+  m.readout_over_gap = scan.readout_s / gap_s;
+  pair->bend_sigma_rad = BendSigma(turn_sigma_rad_s_, scan.readout_s, gap_s);
   pair->bend_prior = graph_.AddFactor(
       std::make_shared<GaussianPrior>(
           std::vector<GaussianPrior::Block>{{BendVector::Zero(), pair->bend_sigma_rad, false}}),

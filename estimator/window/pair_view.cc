@@ -193,14 +193,16 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
   m.matches.clear();
   m.q_a_b = pair.rotation.q_a_b;
   const double gap_s = m.frame_b.stamp_s - m.frame_a.stamp_s;
-  m.readout_over_gap = calibration.readout_s / gap_s;
+  const ShutterParameters shutter = ShutterOf(calibration);
+  const Scan scan = ScanOf(shutter, m.size_px, calibration.pair_effects(), m.frame_a);
+  m.scan_shares = scan.shares;
+  m.readout_over_gap = scan.readout_s / gap_s;
   view->bend_sigma_rad = BendSigma(
       std::max(options.turn_sigma_rad_s,
                calibration.effects ? calibration.effects->widened_sigma(PairLatent::kTurn) : 0.0),
-      calibration.readout_s, gap_s);
+      scan.readout_s, gap_s);
   m.effects = calibration.pair_effects().set != nullptr ? calibration.effects : nullptr;
   const RotationChain chain(m.rate_times_s, view->rates);
-  const ShutterParameters shutter = ShutterOf(calibration);
   const Eigen::Matrix3d R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
   view->bearings = {};
   Bearing a, b;

@@ -33,6 +33,17 @@ double LargestShift(const std::vector<TimedPair>& pairs, const Calibration& a,
   return largest;
 }
 
+// By how much of the readout two calibrations differ in what is read, columns or rows.
+double TurnOfScan(const TimedPair& pair, const Calibration& a, const Calibration& b) {
+  if (a.pair_effects().set == nullptr) return 0.0;
+  const auto shares = [&](const Calibration& c) {
+    return ScanOf(ShutterOf(c), Eigen::Vector2d(c.width_px, c.height_px), c.pair_effects(),
+                  pair.first())
+        .shares;
+  };
+  return (shares(a) - shares(b)).cwiseAbs().maxCoeff();
+}
+
 // The spread of the frames' own times, if they have any, for the next solve. True if it has
 // settled: within a share, as the scale of the noise, or so small that no match shows it.
 bool UpdateFrameTimes(double settled, PairGraph* graph, std::vector<FrameOffset>* offsets) {
@@ -158,10 +169,13 @@ class Refinement {
   }
 
  private:
-  // Rates are kept around the pairs as the delay was when they were added, and those of the samples
-  // of one value differ as they did with the effects of then.
+  // Rates are kept around the pairs as the delay was when they were added, the pairs' directions
+  // bend along what was read then, and the rates of the samples of one value differ as they did
+  // with the effects of then.
   bool IsBuiltForOthers(const Calibration& now) const {
+    constexpr double kTurnedScan = 0.2;  // of the readout: bends are small
     if (LargestShift(pairs_, now, built_at_) > 0.5 * graph_options_.rate_margin_s) return true;
+    if (TurnOfScan(pairs_.front(), now, built_at_) > kTurnedScan) return true;
     if (now.effects == nullptr || facts_.of_attitudes) return false;
     return NeglectedPx(input_.rates, graph_options_, built_at_.lens[kFocal], *now.effects,
                        now.effect_values - built_at_.effect_values) > graph_options_.rate_step_px;

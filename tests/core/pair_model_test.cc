@@ -182,5 +182,30 @@ TEST(PairModel, BackpropagationByEffectsMatchesDifferences) {
   }
 }
 
+// Rows alone, also from bottom to top; a sensor that was turned; and both at once, as a pixel that
+// is read first and last at opposite corners.
+TEST(PairModel, ScanOfRowsAndColumns) {
+  const Vector2d size(480.0, 640.0);
+  const FrameTime frame(5.0, 0.0);
+  const auto expect = [&](const Scan& scan, double readout_s, const Vector2d& shares) {
+    EXPECT_NEAR(scan.readout_s, readout_s, 1e-15);
+    EXPECT_LT((scan.shares - shares).norm(), 1e-12) << scan.shares.transpose();
+  };
+  expect(ScanOf({0.02, 0.1}, size, {}, frame), 0.02, {0.0, 1.0});
+  expect(ScanOf({-0.02, 0.1}, size, {}, frame), -0.02, {0.0, 1.0});
+  expect(ScanOf({0.0, 0.1}, size, {}, frame), 0.0, {0.0, 1.0});
+
+  EffectSetup setup;
+  setup.size_px = size;
+  setup.frames = {frame, FrameTime(5.1, 0.0)};
+  const Result<EffectSet> set = MakeEffects("readout_direction", setup);
+  ASSERT_TRUE(set) << set.error().message;
+  const double value = -0.03;
+  const PairEffects columns{&*set, &value};
+  expect(ScanOf({0.0, 0.1}, size, columns, frame), -0.03, {1.0, 0.0});
+  expect(ScanOf({0.015, 0.1}, size, columns, frame), -0.03, {1.0, -0.5});
+  expect(ScanOf({0.06, 0.1}, size, columns, frame), 0.06, {-0.5, 1.0});
+}
+
 }  // namespace
 }  // namespace camgyro

@@ -124,7 +124,7 @@ INSTANTIATE_TEST_SUITE_P(
              {0.4 * 650.0, 0.4 * 650.0 * std::log(0.5 / 0.45), 0.0, 0.0, 0.0}},
         Case{"clock_skew", "effects.clock_skew={ppm: 400}", {400.0}},
         Case{"delay_step:5", "effects.delay_step={time_s: 5.0,step_s: 0.01}", {0.01}},
-        Case{"readout_direction", "effects.readout_direction={columns: true}", {0.02}, 8.0},
+        Case{"readout_direction", "effects.readout_direction={columns: true}", {0.02}},
         Case{"readout_nonlinear", "effects.readout_nonlinear={curve: 0.06}", {0.06 * 0.02}},
         Case{"gyro_scale", "effects.gyro_scale={error: [0.015,-0.01,0.02]}", {0.015, -0.01, 0.02}},
         Case{"gyro_misalignment",
