@@ -112,6 +112,7 @@ class CalibrationJob {
       if (!point) return tl::unexpected(point.error());
       report_.prior = std::move(point->prior);
       estimate_ = std::move(point->estimate);
+      for (const std::string& note : point->notes) report_.notes.push_back(note);
       if (options_.take_stabiliser) {
         AddStabiliser(recording_, *start, *report_.residual, &estimate_);
       }

@@ -83,7 +83,7 @@ void AddEffect(const EffectSetup& setup, const EffectEntry& entry, const std::st
 
 Status AddStartEffects(const Recording& recording, const StartResult& start,
                        const std::string& list, const PairResidual& residual,
-                       Calibration* calibration) {
+                       Calibration* calibration, std::vector<std::string>* notes) {
   EffectSetup setup = MakeEffectSetup(recording, *calibration);
   setup.clock_skew = start.clock_skew;
   TellOfStabiliser(start, &setup);
@@ -92,7 +92,10 @@ Status AddStartEffects(const Recording& recording, const StartResult& start,
   if (!effects) return tl::unexpected(effects.error());
   for (const EffectEntry& entry : EffectCatalogue()) {
     if (!entry.found_at_start || effects->Has(entry.name) || !entry.found_at_start(setup)) continue;
+    // What may be, and need not, keeps nobody from a residual that knows no effects.
+    if (!entry.start_note.empty() && !residual.facts().with_effects) continue;
     AddEffect(setup, entry, entry.shapes(setup).back(), residual, &*effects);
+    if (notes != nullptr && !entry.start_note.empty()) notes->push_back(entry.start_note);
   }
   if (const std::string shape = ShapeOfGyroClock(recording);
       !shape.empty() && !effects->Has("clock_skew") && residual.facts().with_effects) {
@@ -189,7 +192,8 @@ Result<StartingPoint> MakeStartingPoint(const Recording& recording, const StartR
     point.estimate.delay_s = start.delay_middle_row_s - 0.5 * point.estimate.readout_s;
   }
   if (start.focal && start.focal->determined) point.estimate.lens[kFocal] = start.focal->value_px;
-  if (const Status added = AddStartEffects(recording, start, effects, residual, &point.estimate);
+  if (const Status added =
+          AddStartEffects(recording, start, effects, residual, &point.estimate, &point.notes);
       !added) {
     return tl::unexpected(added.error());
   }

@@ -31,10 +31,11 @@ PairGraphOptions GraphOptionsFor(const Recording& recording, const StartResult& 
 // Puts effects into a calibration that has none: those of a list (MakeEffects), and those that the
 // start has found (EffectEntry::found_at_start) and the residual can have, with the values where a
 // fit begins. A gyro's clock that was found behind stamps of arrival brings clock_skew, where its
-// rate is not known so well that it does not show. Errors: the list's.
+// rate is not known so well that it does not show. notes, if wanted: of what was not in the list
+// (EffectEntry::start_note) is appended. Errors: the list's.
 Status AddStartEffects(const Recording& recording, const StartResult& start,
                        const std::string& list, const PairResidual& residual,
-                       Calibration* calibration);
+                       Calibration* calibration, std::vector<std::string>* notes = nullptr);
 
 // What effects may know of the start: a lens that follows the camera's turns, or one that is held.
 void TellOfStabiliser(const StartResult& start, EffectSetup* setup);
@@ -51,6 +52,7 @@ struct StartingPoint {
   // turn, to rotations: where a bias beyond the prior's sigma may be that, one that is found
   // without it.
   Calibration estimate;
+  std::vector<std::string> notes;
 };
 
 // MakePrior and AddStartEffects, with what else the start has found. Errors: of the effects' list.

@@ -66,8 +66,7 @@ RECORDINGS = (
     rows_of("phone-cc9-street", dict(f=575.0448, c_x=406.0101, c_y=309.0112, t_d=-2.6e-3,
                                      axes=ANDROID), USUAL)
     # README: checkerboard calibration; the source maps the gyro as (x, -y, -z).
-    + rows_of("iphone-cards", dict(f=567.30, c_x=243.35, c_y=342.38, axes=(0, 1, 0, 0)),
-              "--effects=readout_direction:columns")
+    + rows_of("iphone-cards", dict(f=567.30, c_x=243.35, c_y=342.38, axes=(0, 1, 0, 0)))
     + rows_of("gopro-hero5-karma/karma.mp4", {})
     + rows_of("gopro-hero7-hypersmooth/hero7.mp4", {})
     + rows_of("tablet-shield-burst", {})

@@ -172,6 +172,8 @@ struct EffectEntry {
   std::function<ShapedEffect(const EffectSetup&, double stamp_s)> step_at = {};
   // What the start finds beyond doubt is in the model from then on. Null: it does not look for it.
   std::function<bool(const EffectSetup&)> found_at_start = {};
+  // What a note then says of it, where the start itself says nothing.
+  std::string start_note = {};
   // Several of it add up, as steps do; of others, one shape takes the place of another.
   bool adds_up = false;
   // At sizes that real devices have, the plain model without it is so far off that its linear

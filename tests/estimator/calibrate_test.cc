@@ -336,5 +336,50 @@ TEST(AddStartEffects, FreesTheTimesOfFramesThatAreStampedLate) {
   EXPECT_FALSE(has_frame_times(ByPlane()));
 }
 
+// A picture that is higher than wide may have been turned: its columns may be read, where the
+// residual can have that.
+TEST(AddStartEffects, ReadsColumnsOfTurnedPictures) {
+  Recording recording = SimulateTracks(ShortScenario(2.0)).value().recording;
+  std::vector<std::string> notes;
+  const auto reads_columns = [&](const std::string& asked, const PairResidual& residual) {
+    Calibration calibration;
+    calibration.width_px = recording.camera.width_px;
+    calibration.height_px = recording.camera.height_px;
+    notes.clear();
+    EXPECT_TRUE(AddStartEffects(recording, {}, asked, residual, &calibration, &notes));
+    return calibration.effects != nullptr && calibration.effects->Has("readout_direction");
+  };
+  EXPECT_FALSE(reads_columns("", ByPlane()));
+  std::swap(recording.camera.width_px, recording.camera.height_px);
+  EXPECT_TRUE(reads_columns("", ByPlane()));
+  EXPECT_THAT(notes, testing::ElementsAre(HasSubstr("higher than wide")));
+  EXPECT_TRUE(reads_columns("readout_direction", ByPlane()));
+  EXPECT_THAT(notes, testing::IsEmpty());
+  EXPECT_FALSE(reads_columns("", ByTransfer()));
+}
+
+// A phone in portrait, whose columns are read, in the hand of somebody who walks: the path of each
+// match is that between its columns.
+TEST(CalibrateRecording, OfAPictureThatWasTurned) {
+  Scenario scenario = ShortScenario(12.0);
+  scenario.camera.width_px = 480;
+  scenario.camera.height_px = 720;
+  scenario.camera.principal_px = {239.5, 359.5};
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  scenario.effects.readout_direction.columns = true;
+  const Simulated s = SimulateTracks(scenario).value();
+  const Result<CalibrationReport> report =
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), {});
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  const Calibration& c = report->calibration;
+  ASSERT_TRUE(c.effects && c.effects->Has("readout_direction"));
+  EXPECT_NEAR(c.effect_values[0], 0.02, 4.0 * std::sqrt(c.effect_covariance(0, 0)));
+  EXPECT_LT(c.effect_covariance(0, 0), std::pow(0.5e-3, 2));
+  Calibration truth = s.truth;
+  truth.readout_s = 0.0;  // of rows
+  const StateVector error = ErrorInSigmas(c, truth);
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 4.0) << error.transpose();
+}
+
 }  // namespace
 }  // namespace camgyro
