@@ -4,6 +4,7 @@
 
 #include "camgyro/calibrator.h"
 #include "camgyro/version.h"
+#include "core/pair_model.h"
 #include "core/standard_distortion.h"
 
 namespace camgyro {
@@ -59,6 +60,7 @@ api::Calibration ToApi(const Calibration& calibration) {
   }
   std::copy(distortion.k.data(), distortion.k.data() + 4, c.distortion.begin());
   c.readout_s = calibration.readout_s;
+  c.column_readout_s = ColumnReadoutOf(calibration);
   c.delay_s = calibration.delay_s;
   c.bias_gyro_rad_s = ToApi(calibration.bias_gyro_rad_s);
   c.q_gyro_cam_wxyz = ToApi(calibration.q_gyro_cam);
@@ -228,6 +230,9 @@ Result<Calibration> FromApi(const api::Calibration& c) {
   as_guess.q_gyro_cam_wxyz = c.q_gyro_cam_wxyz;
   const Result<CameraGuess> checked = FromApi(as_guess);
   if (!checked) return tl::unexpected(checked.error());
+  if (ReadsColumns(c.readout_s, c.column_readout_s)) {
+    return BadUsage(std::string("calibration: ") + kReadsColumns);
+  }
   if (!Finite(c.bias_gyro_rad_s)) return BadUsage("calibration: the gyro bias is not finite");
   Calibration calibration;
   calibration.width_px = c.width_px;

@@ -2,9 +2,10 @@
 // program is compiled.
 //
 // Conventions. Time: int64 nanoseconds of a clock; t_gyro = t_camera + delay_s, and row v of h rows
-// is exposed at t_gyro = stamp + delay_s + readout_s * v / h. Camera frame: x right, y down, z
-// forward; pixel (0, 0) is the centre of the top-left pixel. q_gyro_cam maps camera vectors to the
-// gyro frame (Hamilton, [w x y z]). Rates: measured = true + bias.
+// is exposed at t_gyro = stamp + delay_s + readout_s * v / h; of a picture that was turned, column
+// u of w columns later by column_readout_s * u / w. Camera frame: x right, y down, z forward; pixel
+// (0, 0) is the centre of the top-left pixel. q_gyro_cam maps camera vectors to the gyro frame
+// (Hamilton, [w x y z]). Rates: measured = true + bias.
 #ifndef CAMGYRO_TYPES_H_
 #define CAMGYRO_TYPES_H_
 
@@ -79,6 +80,9 @@ struct Calibration {
   Distortion distortion_model = Distortion::kRadTan;
   std::array<double, 4> distortion{};
   double readout_s = 0.0;
+  // First to last column, beside readout_s: of pictures that are higher than wide, which were most
+  // likely turned after they had been read. Zero for all others.
+  double column_readout_s = 0.0;
   double delay_s = 0.0;
   Vec3 bias_gyro_rad_s{};
   std::array<double, 4> q_gyro_cam_wxyz{1.0, 0.0, 0.0, 0.0};

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/pair_model.h"
 #include "pipeline/device.h"
 
 namespace camgyro {
@@ -224,16 +225,34 @@ Calibration Parse(const YAML::Node& root) {
   return c;
 }
 
+constexpr char kColumns[] = "readout_direction";
+
+// An effect in the file: a mapping, or its name alone.
+std::string NameOfEffect(const YAML::Node& effect) {
+  const YAML::Node name = effect.IsMap() ? effect["name"] : effect;
+  if (!name || !name.IsScalar()) {
+    throw Complaint{effect.Mark(), "effects: expected a list of {name: ...}"};
+  }
+  return name.Scalar();
+}
+
+// Of the effect that reads columns.
+double ParseColumnReadout(const YAML::Node& root) {
+  double sum_s = 0.0;
+  const YAML::Node effects = root.IsMap() ? root["effects"] : YAML::Node();
+  for (const YAML::Node& effect : effects) {
+    if (NameOfEffect(effect) != kColumns || !effect.IsMap()) continue;
+    for (const YAML::Node& parameter : effect["parameters"]) {
+      sum_s += Section("effects", parameter).Number("value", 0.0);
+    }
+  }
+  return sum_s;
+}
+
 std::vector<std::string> ParseEffectNames(const YAML::Node& root) {
   std::vector<std::string> names;
   const YAML::Node effects = root.IsMap() ? root["effects"] : YAML::Node();
-  for (const YAML::Node& effect : effects) {
-    const YAML::Node name = effect.IsMap() ? effect["name"] : effect;
-    if (!name || !name.IsScalar()) {
-      throw Complaint{effect.Mark(), "effects: expected a list of {name: ...}"};
-    }
-    names.push_back(name.Scalar());
-  }
+  for (const YAML::Node& effect : effects) names.push_back(NameOfEffect(effect));
   return names;
 }
 
@@ -265,7 +284,8 @@ CalibrationReport ParseReport(const YAML::Node& root) {
   Calibration& c = report.calibration;
   c = Parse(root);
   for (const std::string& name : ParseEffectNames(root)) {
-    if (!IsEffectOfDevice(name)) continue;
+    // Of columns the file's covariance holds all that the parameters have to do with them.
+    if (!IsEffectOfDevice(name) || name == kColumns) continue;
     throw Complaint{root["effects"].Mark(),
                     "effects: " + name + ": expected a calibration without it, to be combined"};
   }
@@ -313,6 +333,16 @@ Result<Calibration> ReadCalibration(const std::string& path) { return ParseFile(
 
 Result<CalibrationReport> ReadCalibrationReport(const std::string& path) {
   return ParseFile(path, ParseReport);
+}
+
+Result<Calibration> ReadCalibrationOfRows(const std::string& path) {
+  const Result<double> columns_s = ParseFile(path, ParseColumnReadout);
+  if (!columns_s) return tl::unexpected(columns_s.error());
+  Result<Calibration> calibration = ReadCalibration(path);
+  if (calibration && ReadsColumns(calibration->readout_s, *columns_s)) {
+    return BadInput(path + ": " + kReadsColumns);
+  }
+  return calibration;
 }
 
 Result<std::vector<std::string>> ReadEffectNames(const std::string& path) {

@@ -22,10 +22,15 @@ namespace camgyro {
 Result<Calibration> ReadCalibration(const std::string& path);
 
 // The same with what CombineToDevice needs beside: prior, shares of undeclared effects, numbers of
-// the fit. Effects that belong to a recording are left aside. Errors also: no prior (a file of
-// another program, or of an older camgyro); effects of the device, whose shapes the file does not
-// hold; a covariance that is none.
+// the fit. Effects that belong to a recording are left aside, and readout_direction, whose
+// uncertainty is in the covariance. Errors also: no prior (a file of another program, or of an
+// older camgyro); other effects of the device, whose shapes the file does not hold; a covariance
+// that is none.
 Result<CalibrationReport> ReadCalibrationReport(const std::string& path);
+
+// ReadCalibration for programs that know the readout of rows only. Errors also: columns are read
+// (ReadsColumns).
+Result<Calibration> ReadCalibrationOfRows(const std::string& path);
 
 // Names of the effects that the file lists. Errors as above.
 Result<std::vector<std::string>> ReadEffectNames(const std::string& path);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/pair_model.h"
 #include "core/standard_distortion.h"
 #include "estimator/vins/initialise.h"
 #include "pipeline/device.h"
@@ -150,6 +151,9 @@ void BindCalibration(py::module_* module) {
           [](const Calibration& c) { return DistortionModelName(Standard(c).model); },
           "str: none, radtan or kannala_brandt")
       .def_readwrite("readout_s", &Calibration::readout_s, "first to last row [s]")
+      .def_property_readonly(
+          "column_readout_s", &ColumnReadoutOf,
+          "first to last column [s], beside readout_s: of pictures that were turned")
       .def_readwrite("delay_s", &Calibration::delay_s, "t_gyro = t_camera + delay_s [s]")
       .def_property(
           "bias_rad_s", [](const Calibration& c) { return c.bias_gyro_rad_s; },

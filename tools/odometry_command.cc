@@ -7,6 +7,7 @@
 
 #include "core/format.h"
 #include "core/free_memory.h"
+#include "core/pair_model.h"
 #include "estimator/odometry/follow_recording.h"
 #include "estimator/odometry/gyro_rate_trajectory.h"
 #include "pipeline/find_loops.h"
@@ -77,7 +78,7 @@ Result<OdometryOptions> OptionsFromFlags() {
 // That of --calibration, or the recording's own.
 Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
   if (!FLAGS_calibration.empty()) {
-    Result<Calibration> calibration = ReadCalibration(FLAGS_calibration);
+    Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
     if (!calibration) return calibration;
     if (Status read = ApplyFrameTimes(FLAGS_calibration, recording); !read) {
       return tl::unexpected(read.error());
@@ -92,6 +93,10 @@ Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
       options, OnlineEstimator::kWindow, *device,
       [&](const std::string& stage, double done) { bar->Show(stage, done); }, recording);
   if (!run) return tl::unexpected(run.error());
+  const Calibration& fit = run->report.calibration;
+  if (ReadsColumns(fit.readout_s, ColumnReadoutOf(fit))) {
+    return BadInput(std::string("calibration: ") + kReadsColumns);
+  }
   ApplyFrameTimes(run->report.frame_times, recording);
   return run->report.calibration;
 }

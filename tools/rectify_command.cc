@@ -122,7 +122,7 @@ Status RunRectify(const std::vector<std::string>& arguments) {
   }
   NewFolder folder(FLAGS_out);
   if (Status made = folder.Make(); !made) return made;
-  const Result<Calibration> calibration = ReadCalibration(FLAGS_calibration);
+  const Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
   if (!calibration) return tl::unexpected(calibration.error());
   const Result<ReadOptions> reading = ReadOptionsFromFlags();
   if (!reading) return tl::unexpected(reading.error());

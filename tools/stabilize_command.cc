@@ -102,7 +102,7 @@ Status RunStabilize(const std::vector<std::string>& arguments) {
   if (extension != ".mp4" && extension != ".mov" && extension != ".mkv") {
     return BadUsage("stabilize: --out: expected the name of a video, .mp4, .mov or .mkv");
   }
-  const Result<Calibration> calibration = ReadCalibration(FLAGS_calibration);
+  const Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
   if (!calibration) return tl::unexpected(calibration.error());
   const Result<ReadOptions> reading = ReadOptionsFromFlags();
   if (!reading) return tl::unexpected(reading.error());

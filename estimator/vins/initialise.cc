@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/format.h"
+#include "core/pair_model.h"
 #include "estimator/vins/alignment.h"
 #include "estimator/vins/structure.h"
 #include "estimator/vins/vins_refinement.h"
@@ -118,6 +119,9 @@ std::string VinsVerdictName(VinsVerdict verdict) {
 }
 
 Result<VinsStart> InitialiseVins(const VinsInput& input, const VinsOptions& options) {
+  if (ReadsColumns(input.calibration.readout_s, ColumnReadoutOf(input.calibration))) {
+    return BadInput(std::string("calibration: ") + kReadsColumns);
+  }
   VinsStart start;
   start.calibration = input.calibration;
   const Result<VinsWindow> window = MakeVinsWindow(input, options.keyframe_interval_s);

@@ -263,6 +263,25 @@ TEST(Calibrator, TakesInALensThatNobodyDeclared) {
   EXPECT_LT(Sigmas(c.focal_px, s.truth.lens[camgyro::kFocal], snapshot->parameters[kFocal]), 4.5);
 }
 
+// A phone in portrait, whose sensor's rows are the columns of its pictures.
+TEST(Calibrator, SaysThatColumnsAreRead) {
+  Scenario scenario = LivelyScenario(9.0);
+  scenario.camera.width_px = 480;
+  scenario.camera.height_px = 720;
+  scenario.effects.readout_direction.columns = true;
+  const Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto calibrator = Make(OptionsFor(scenario));
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(120.0));
+  const auto snapshot = calibrator->snapshot();
+  ASSERT_TRUE(snapshot->has_estimate) << snapshot->message;
+  const Calibration& c = snapshot->calibration;
+  EXPECT_NEAR(c.column_readout_s, 0.02, 1e-3);
+  EXPECT_NEAR(c.readout_s, 0.0, 1e-3);
+  EXPECT_LT(Sigmas(c.focal_px, s.truth.lens[camgyro::kFocal], snapshot->parameters[kFocal]), 4.0);
+  EXPECT_LT(Sigmas(c.delay_s, s.truth.delay_s, snapshot->parameters[kDelay]), 4.0);
+}
+
 TEST(Calibrator, WithoutMotionItSaysWhy) {
   Scenario scenario = LivelyScenario(7.0);
   scenario.motion.rotation_rms_rad_s.setConstant(1e-5);

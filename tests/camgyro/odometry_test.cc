@@ -119,6 +119,10 @@ TEST(LibraryOdometry, AnswersToBadData) {
   broken.covariance[0] = std::nan("");
   EXPECT_FALSE(api::Odometry::Create(broken, {}, &error));
   EXPECT_THAT(error, testing::HasSubstr("covariance"));
+  broken = calibration;
+  broken.column_readout_s = 0.03;
+  EXPECT_FALSE(api::Odometry::Create(broken, {}, &error));
+  EXPECT_THAT(error, testing::HasSubstr("read column by column"));
 }
 
 }  // namespace

@@ -139,6 +139,23 @@ TEST_F(ReadCalibrationTest, AReportIsReadBackToBeCombined) {
               HasSubstr("effects: aspect_ratio: expected a calibration without it"));
   // That of a recording is not the device's.
   EXPECT_EQ(with("effects:\n  []", "effects: [clock_skew]"), "was read");
+  // It has a place in the covariance, as what a picture that is higher than wide may have.
+  EXPECT_EQ(with("effects:\n  []", "effects: [readout_direction]"), "was read");
+}
+
+TEST_F(ReadCalibrationTest, SaysThatColumnsAreRead) {
+  const auto read = [&](const std::string& readout, const std::string& columns) {
+    std::ofstream(Path("c.yaml"))
+        << "camera: {resolution: [48, 64], focal_px: 50}\nshutter: {readout_s: " << readout
+        << "}\neffects: [{name: clock_skew, parameters: [{value: 9}]}, {name: readout_direction, "
+        << "parameters: [{name: column_readout, value: " << columns << "}]}]\n";
+    const Result<Calibration> rows = ReadCalibrationOfRows(Path("c.yaml"));
+    return rows ? std::string("by rows") : rows.error().message;
+  };
+  EXPECT_EQ(read("0.02", "0.0029"), "by rows");
+  EXPECT_EQ(read("0.0001", "-0.0002"), "by rows");  // a global shutter
+  EXPECT_THAT(read("0.001", "-0.03"), HasSubstr("c.yaml: the pictures are read column by column"));
+  EXPECT_THAT(read("0.02", "fast"), HasSubstr("c.yaml:3: effects: value: expected"));
 }
 
 TEST_F(ReadCalibrationTest, AbsentSectionsKeepDefaults) {

@@ -87,6 +87,11 @@ TEST_F(RectifyCommandTest, RefusesWithoutLeavingAnything) {
   expect("a --calibration=a/truth.yaml --out=a", 2, "expected a new or empty folder");
   expect("a --calibration=none.yaml --out=b", 3, "none.yaml");
   expect("nowhere --calibration=a/truth.yaml --out=b", 3, "nowhere");
+  std::string yaml = ReadFile(Path("a/truth.yaml"));
+  std::ofstream(Path("columns.yaml")) << yaml.replace(
+      yaml.find("effects: []"), 11,
+      "effects: [{name: readout_direction, parameters: [{value: -0.03, sigma: 0.001}]}]");
+  expect("a --calibration=columns.yaml --out=b", 3, "columns.yaml: the pictures are read column");
 }
 
 }  // namespace
