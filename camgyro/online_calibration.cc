@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/format.h"
+#include "core/pair_model.h"
 #include "core/time.h"
 #include "estimator/astray.h"
 #include "estimator/calibrate.h"
@@ -209,7 +210,8 @@ size_t OnlineCalibration::NextGap() const {
 bool OnlineCalibration::AddPair(const OnlineFrame& a, const OnlineFrame& b) {
   const Calibration& estimate = window_->latest().estimate;
   const int64_t needed_ns =
-      StampAt(b.stamp_ns, estimate.delay_s + std::max(0.0, estimate.readout_s) + kGyroMarginS);
+      StampAt(b.stamp_ns, estimate.delay_s + std::max(0.0, estimate.readout_s) +
+                              std::max(0.0, ColumnReadoutOf(estimate)) + kGyroMarginS);
   if (gyro_.empty() || gyro_.back().stamp_ns < needed_ns) return false;
   while (!gyro_.empty() && gyro_.front().stamp_ns <= needed_ns) {
     // Refused is what differs from its neighbour by less than a double tells: nothing is lost.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/pair_model.h"
+
 namespace camgyro::api {
 namespace {
 
@@ -30,7 +32,8 @@ void RecentWindow::Add(OnlineFrame frame) {
 void RecentWindow::CopyTo(double window_s, VinsInput* input) const {
   if (frames_.empty() || gyro_.empty()) return;
   const double delay_s = input->calibration.delay_s;
-  const double margin_s = 0.05 + std::abs(input->calibration.readout_s);
+  const double margin_s =
+      0.05 + std::abs(input->calibration.readout_s) + std::abs(ColumnReadoutOf(input->calibration));
   const std::int64_t newest_ns = StampAt(gyro_.back().stamp_ns, -delay_s - margin_s);
   const auto last = std::upper_bound(
       frames_.begin(), frames_.end(), newest_ns,

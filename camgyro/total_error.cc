@@ -16,26 +16,29 @@ namespace {
 
 using camgyro::EffectSet;
 
-// The effects of the estimate that are its lens; those of clocks are of a recording.
-std::vector<EffectSet::Item> LensOf(const camgyro::Calibration& estimate) {
-  std::vector<EffectSet::Item> of_lens;
-  if (estimate.effects == nullptr) return of_lens;
+constexpr char kClocks[] = "clock_skew";
+
+// The effects of the estimate that are of the device, as its lens; those of clocks are of a
+// recording.
+std::vector<EffectSet::Item> OfDevice(const camgyro::Calibration& estimate) {
+  std::vector<EffectSet::Item> of_device;
+  if (estimate.effects == nullptr) return of_device;
   for (const EffectSet::Item& item : estimate.effects->items()) {
-    if (item.effect->is_constant_lens()) of_lens.push_back(item);
+    if (item.entry->name != kClocks && !item.effect->frees_frame_times()) of_device.push_back(item);
   }
-  return of_lens;
+  return of_device;
 }
 
 std::string NamesOf(const camgyro::Calibration& estimate) {
-  std::string names = "clock_skew";
-  for (const EffectSet::Item& item : LensOf(estimate)) {
+  std::string names = kClocks;
+  for (const EffectSet::Item& item : OfDevice(estimate)) {
     names += "," + item.entry->name + ":" + item.shape;
   }
   return names;
 }
 
-void TakeLens(const camgyro::Calibration& estimate, camgyro::Calibration* calibration) {
-  for (const EffectSet::Item& from : LensOf(estimate)) {
+void TakeDevice(const camgyro::Calibration& estimate, camgyro::Calibration* calibration) {
+  for (const EffectSet::Item& from : OfDevice(estimate)) {
     for (const EffectSet::Item& to : calibration->effects->items()) {
       if (to.entry != from.entry) continue;
       calibration->effect_values.segment(to.first, to.effect->size()) =
@@ -75,11 +78,11 @@ void TotalError::Renew(const VinsInput& latest, MatchNoise noise,
   const Status added = AddStartEffects(recording, report.start, NamesOf(*progress.estimate),
                                        ByPlane(), &calibration);
   if (!added) return;
-  TakeLens(*progress.estimate, &calibration);
+  TakeDevice(*progress.estimate, &calibration);
   const FrameTime latest_frame{
       SecondsSince(recording.gyro.front().stamp_ns, progress.frame_stamp_ns),
       std::numeric_limits<double>::quiet_NaN()};
-  calibration.delay_s += progress.estimate->delay_s - DelayOf(calibration, latest_frame);
+  calibration.delay_s += progress.estimate->delay_s - FirstDelayOf(calibration, latest_frame);
   if (const int spread = calibration.effects->frame_time_spread(); spread >= 0) {
     calibration.effect_values[spread] = progress.frame_spread_s;
   }

@@ -85,13 +85,26 @@ EstimationInput OutlineOf(const Recording& recording, const PairSelection& selec
   return input;
 }
 
-double DelayOf(const Calibration& calibration, const FrameTime& frame) {
+namespace {
+
+// part: where in the picture, of its size.
+double DelayAt(const Calibration& calibration, const FrameTime& frame, double part) {
   const PairEffects effects = calibration.pair_effects();
   if (effects.set == nullptr) return calibration.delay_s;
   const Eigen::Vector2d size_px(calibration.width_px, calibration.height_px);
   EffectSet::Change change;
-  effects.set->ChangeObservation({0.5 * size_px, size_px, frame}, &change);
+  effects.set->ChangeObservation({part * size_px, size_px, frame}, &change);
   return calibration.delay_s + change.time.row(0).dot(calibration.effect_values);
+}
+
+}  // namespace
+
+double DelayOf(const Calibration& calibration, const FrameTime& frame) {
+  return DelayAt(calibration, frame, 0.5);
+}
+
+double FirstDelayOf(const Calibration& calibration, const FrameTime& frame) {
+  return DelayAt(calibration, frame, 0.0);
 }
 
 EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration) {

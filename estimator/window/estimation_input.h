@@ -34,8 +34,10 @@ void AddMatches(const Recording& recording, std::vector<TimedPair>* pairs);
 // Pairs of which none begins before the one before ends, for estimators that go along.
 std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs);
 
-// The delay of a frame with the effects, in the middle of its picture [s].
+// The delay of a frame with the effects, in the middle of its picture; and at its first row and
+// column, whose delay t_d is [s].
 double DelayOf(const Calibration& calibration, const FrameTime& frame);
+double FirstDelayOf(const Calibration& calibration, const FrameTime& frame);
 
 // What effects may know of a recording, with what a calibration says of it so far.
 EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration);

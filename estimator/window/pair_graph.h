@@ -213,7 +213,7 @@ class PairGraph {
   // State and effects as functionals of the blocks. Errors: kCannotEstimate without pairs.
   Result<std::vector<FactorGraph::Functional>> StateFunctionals(
       const std::optional<FrameTime>& at = std::nullopt) const;
-  // Derivatives of a frame's delay by the effects [s].
+  // Derivatives of the delay of a frame's first row and column by the effects [s].
   Eigen::VectorXd DelayByEffects(const FrameTime& frame) const;
   // Of the clocks' rates since the oldest pair, if they are in the model.
   std::optional<FactorGraph::Walk> SkewWalk(double skew_walk_rtHz) const;

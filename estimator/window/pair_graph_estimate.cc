@@ -151,7 +151,7 @@ PairLatents PairGraph::Latents() const {
 Eigen::VectorXd PairGraph::DelayByEffects(const FrameTime& frame) const {
   const Eigen::Vector2d size_px(prior_mean_.width_px, prior_mean_.height_px);
   EffectSet::Change change;
-  effects_->ChangeObservation({0.5 * size_px, size_px, frame}, &change);
+  effects_->ChangeObservation({Eigen::Vector2d::Zero(), size_px, frame}, &change);
   return change.time.row(0);
 }
 

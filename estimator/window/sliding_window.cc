@@ -203,7 +203,7 @@ Status SlidingWindow::SolveWindow(const TimedPair& newest, WindowUpdate* update)
   const Status covariance =
       graph_.EstimateCovariance(/*cluster_s=*/2.0, cross_fit_.inflation(), estimate, at);
   if (!covariance || skew < 0) return covariance;
-  estimate->delay_s = DelayOf(*estimate, newest.second());
+  estimate->delay_s = FirstDelayOf(*estimate, newest.second());
   update->clock_skew = 1e-6 * estimate->effect_values[skew];
   estimate->effect_values[skew] = 0.0;
   return {};
