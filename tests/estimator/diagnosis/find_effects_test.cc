@@ -86,6 +86,16 @@ TEST(FindEffects, NamesAClockThatRunsFast) {
   EXPECT_NEAR(found.estimate[0], 600.0, 3.0 * found.sigma[0]);
 }
 
+// Wider than high, so that nobody supposes it.
+TEST(FindEffects, NamesColumnsThatAreRead) {
+  Calibration found;
+  const Diagnosis diagnosis =
+      Find(Simulate(5, {"effects.readout_direction={columns: true}"}), 650.0, &found);
+  ASSERT_THAT(diagnosis.effects, testing::ElementsAre("readout_direction"));
+  EXPECT_NEAR(found.effect_values[0], 0.02, 4.0 * std::sqrt(found.effect_covariance(0, 0)));
+  EXPECT_LT(std::abs(found.readout_s), 4.0 * found.sigma()[kStateReadout]);
+}
+
 TEST(FindEffects, NamesFramesThatAreOffTheirStamps) {
   for (const char* motion : {"walking", "running"}) {
     SCOPED_TRACE(motion);

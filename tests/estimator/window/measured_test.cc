@@ -45,14 +45,19 @@ TEST(Measured, PhoneBehindAWindscreen) {
   EXPECT_LT(c.readout_s, 33e-3);
 }
 
-// Cards on a table, hardly any pan or tilt: the halves of the recording contradict each other.
+// Cards on a table, hardly any pan or tilt: the halves of the recording contradict each other. The
+// picture is higher than wide, and its columns are read, from right to left.
 TEST(Measured, CardsOnATable) {
   READ_OR_SKIP("iphone-cards");
   const auto report = Calibrate(&recording);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   const Calibration& c = report->calibration;
   EXPECT_LT(std::abs(c.lens[kFocal] - 567.3), 3.0 * c.sigma()[kStateFocal]);  // checkerboard
-  EXPECT_FALSE(c.determined[kStateReadout]);
+  ASSERT_TRUE(c.effects && c.effects->Has("readout_direction"));
+  EXPECT_NEAR(c.effect_values[0], -0.030, 0.010);  // what phones' sensors take
+  EXPECT_LT(c.effect_covariance(0, 0), std::pow(5e-3, 2));
+  EXPECT_LT(std::abs(c.readout_s), 3.0 * c.sigma()[kStateReadout]);
+  EXPECT_TRUE(c.determined[kStateDelay] && c.determined[kStateFocal]);
   EXPECT_FALSE(report->doubts.empty());
 }
 
