@@ -280,6 +280,9 @@ TEST(Calibrator, SaysThatColumnsAreRead) {
   EXPECT_NEAR(c.readout_s, 0.0, 1e-3);
   EXPECT_LT(Sigmas(c.focal_px, s.truth.lens[camgyro::kFocal], snapshot->parameters[kFocal]), 4.0);
   EXPECT_LT(Sigmas(c.delay_s, s.truth.delay_s, snapshot->parameters[kDelay]), 4.0);
+  EXPECT_TRUE(snapshot->doubt.empty()) << snapshot->doubt;
+  // Which knows rows only.
+  EXPECT_THAT(calibrator->InitialiseVins({}).explanation, testing::HasSubstr("column by column"));
 }
 
 TEST(Calibrator, WithoutMotionItSaysWhy) {
