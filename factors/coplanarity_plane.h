@@ -43,7 +43,7 @@ using BendVector = Eigen::Matrix<double, 6, 1>;
 // t_r. (Without bow, the steps of somebody who runs leave b_y, c_y, t_r, t_d 0.8 to 0.4 sigmas off
 // at 0.5 px.) Where columns are read as well or instead, p is how far the readout has come at a
 // pixel, and t_r what takes longer (Scan; with p by the rows, columns of 20 ms leave c_x and q_y of
-// somebody who walks 3 to 6 sigmas off).
+// somebody who walks 2 to 6 sigmas off: CalibrateRecording.OfAPictureThatWasTurned).
 //
 // Parameters  lens         kLensSize     LensParameters
 //             shutter      kShutterSize  t_r [s], t_d [s]
