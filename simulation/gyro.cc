@@ -12,12 +12,14 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// What the element sees at the sampling times: the rate in the gyro frame, low-passed if asked.
+// What the element sees at the sampling times: the rate in the gyro frame, of each axis at its
+// time, low-passed if asked.
 class Element {
  public:
   Element(const Scenario& scenario, const Trajectory& trajectory)
       : trajectory_(trajectory),
         R_gyro_cam_(scenario.mount.q_gyro_cam.toRotationMatrix()),
+        axis_delay_(scenario.effects.gyro_axis_delay),
         time_constant_s_(scenario.effects.gyro_lowpass.time_constant_s) {
     if (time_constant_s_ > 0.0) {  // settled before the first sample is read
       time_s_ = -1.0;
@@ -48,11 +50,20 @@ class Element {
 
  private:
   Vector3d Rate(double time_s) const {
+    Vector3d rate = AllAxes(time_s);
+    if (axis_delay_.active()) {
+      rate.y() = AllAxes(time_s - axis_delay_.y_after_x_s).y();
+      rate.z() = AllAxes(time_s - axis_delay_.z_after_x_s).z();
+    }
+    return rate;
+  }
+  Vector3d AllAxes(double time_s) const {
     return R_gyro_cam_ * trajectory_.At(time_s).omega_cam_rad_s;
   }
 
   const Trajectory& trajectory_;
   Matrix3d R_gyro_cam_;
+  GyroAxisDelay axis_delay_;
   double time_constant_s_;
   double time_s_ = 0.0;
   Vector3d filtered_ = Vector3d::Zero();

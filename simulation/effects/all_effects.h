@@ -14,6 +14,7 @@
 #include "simulation/effects/exposure_lowpass.h"
 #include "simulation/effects/focal_drift.h"
 #include "simulation/effects/frame_stamp_jitter.h"
+#include "simulation/effects/gyro_axis_delay.h"
 #include "simulation/effects/gyro_g_sensitivity.h"
 #include "simulation/effects/gyro_lowpass.h"
 #include "simulation/effects/gyro_misalignment.h"
@@ -43,6 +44,7 @@ struct Effects {
   GyroScale gyro_scale;
   GyroMisalignment gyro_misalignment;
   GyroLowpass gyro_lowpass;
+  GyroAxisDelay gyro_axis_delay;
   GyroSaturation gyro_saturation;
   BiasDrift bias_drift;
   GyroGSensitivity gyro_g_sensitivity;
@@ -78,6 +80,7 @@ struct Effects {
     visit(self.gyro_scale);
     visit(self.gyro_misalignment);
     visit(self.gyro_lowpass);
+    visit(self.gyro_axis_delay);
     visit(self.gyro_saturation);
     visit(self.bias_drift);
     visit(self.gyro_g_sensitivity);

@@ -107,6 +107,20 @@ TEST(Gyro, LowPassDelaysAndAttenuatesAsTheoryOfTheFirstOrderSays) {
   }
 }
 
+TEST(Gyro, ReadsItsAxesOneAfterTheOther) {
+  Scenario scenario = Quiet();
+  scenario.mount.q_gyro_cam = MountOptions::DefaultRotation();
+  scenario.effects.gyro_axis_delay = {0.002, -0.003};
+  const double w = 2.0 * M_PI * 2.0;
+  const Vector3d axis = scenario.mount.q_gyro_cam * Vector3d(0, 1.5, 0);
+  for (const GyroSample& sample : SampleGyro(scenario, Tone(1.5, 2.0)).gyro) {
+    const double t = TimeOf(scenario, sample);
+    const Vector3d expected(axis.x() * std::sin(w * t), axis.y() * std::sin(w * (t - 0.002)),
+                            axis.z() * std::sin(w * (t + 0.003)));
+    EXPECT_LT((sample.omega_gyro_rad_s - expected).norm(), 1e-12);
+  }
+}
+
 TEST(Gyro, AveragingAttenuatesWithoutDelay) {
   Scenario scenario = Quiet();
   scenario.gyro.averaged = true;

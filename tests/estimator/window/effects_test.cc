@@ -132,6 +132,9 @@ INSTANTIATE_TEST_SUITE_P(
              {0.01, -0.008, 0.006}},
         // The time constant is in the delay; third order is neglected.
         Case{"gyro_lowpass", "effects.gyro_lowpass={time_constant_s: 0.008}", {6.4e-5}, 4.0, 0.023},
+        Case{"gyro_axis_delay",
+             "effects.gyro_axis_delay={y_after_x_s: 0.002,z_after_x_s: -0.001}",
+             {0.002, -0.001}},
         Case{"bias_drift:linear",
              "effects.bias_drift={rate_rad_s2: [0.005,-0.003,0.002]}",
              {0.005, -0.003, 0.002}},
@@ -184,31 +187,6 @@ TEST(EffectOfALens, LeavesOutPixelsWithoutARayIfAsked) {
     ASSERT_EQ(graph.AddPair(pair), AddPairResult::kAdded);
     EXPECT_EQ(graph.Residuals(0, false).size(), drop ? 11U : 0U);
   }
-}
-
-// Not in the simulator: the y and z axes are read later than x.
-TEST(GyroAxisDelay, FitsReadingsThatAreShiftedAxisByAxis) {
-  const auto scenario = simulation::ParseScenario(
-      "", {"duration_s=9", "seed=4", "tracks.noise_px=0", "gyro.rate_hz=400",
-           "gyro.noise_density_rad_s_rtHz=0", "gyro.bias_walk_rad_s2_rtHz=0"});
-  ASSERT_TRUE(scenario);
-  auto simulated = simulation::SimulateTracks(*scenario);
-  ASSERT_TRUE(simulated);
-  std::vector<GyroSample>& gyro = simulated->recording.gyro;  // a sample each 2.5 ms
-  for (size_t i = gyro.size() - 1; i >= 3; --i) {
-    gyro[i].omega_gyro_rad_s.y() = gyro[i - 2].omega_gyro_rad_s.y();
-    gyro[i].omega_gyro_rad_s.z() = gyro[i - 3].omega_gyro_rad_s.z();
-  }
-  const EstimationInput input = MakeEstimationInput(simulated->recording);
-  Calibration calibration = simulated->truth;
-  const double without = Rms(input, calibration);
-  const Result<EffectSet> effects =
-      MakeEffects("gyro_axis_delay", MakeEffectSetup(simulated->recording, calibration));
-  ASSERT_TRUE(effects);
-  calibration.effects = std::make_shared<const EffectSet>(*effects);
-  calibration.effect_values = Eigen::Vector2d(0.005, 0.0075);
-  const double with = Rms(input, calibration);
-  EXPECT_LT(with, without / 5.0) << "without " << without << " px, with " << with << " px";
 }
 
 }  // namespace
