@@ -1,6 +1,6 @@
 #include "core/effects/rate_derivatives.h"
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -17,7 +17,7 @@ double MeanInterval(const std::vector<double>& times_s) {
 RateDerivatives::RateDerivatives(const EffectSetup& setup, Order order)
     : gyro_(setup.gyro),
       order_(order),
-      half_(std::max<Eigen::Index>(2, std::llround(0.025 / MeanInterval(gyro_->times_s)))),
+      half_(std::max<Eigen::Index>(3, std::llround(0.04 / MeanInterval(gyro_->times_s)))),
       unit_s_(static_cast<double>(half_) * MeanInterval(gyro_->times_s)) {}
 
 Eigen::Index RateDerivatives::IndexAt(double time_gyro_s) const {
@@ -31,16 +31,16 @@ Eigen::Vector3d RateDerivatives::At(Eigen::Index sample) const {
   if (sample < half_ || sample + half_ >= static_cast<Eigen::Index>(times_s.size())) {
     return Eigen::Vector3d::Zero();
   }
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d B = Eigen::Matrix3d::Zero();  // row: power, column: axis
+  Eigen::Matrix<double, 5, 5> A = Eigen::Matrix<double, 5, 5>::Zero();
+  Eigen::Matrix<double, 5, 3> B = Eigen::Matrix<double, 5, 3>::Zero();  // row: power, column: axis
   for (Eigen::Index j = sample - half_; j <= sample + half_; ++j) {
     const double t =
         (times_s[static_cast<size_t>(j)] - times_s[static_cast<size_t>(sample)]) / unit_s_;
-    const Eigen::Vector3d powers(1.0, t, t * t);
+    const Eigen::Matrix<double, 5, 1> powers(1.0, t, t * t, t * t * t, t * t * t * t);
     A += powers * powers.transpose();
     B += powers * gyro_->values.col(j).transpose();
   }
-  const Eigen::Matrix3d coefficients = A.inverse() * B;
+  const Eigen::Matrix<double, 5, 3> coefficients = A.ldlt().solve(B);
   const double scale = order_ == kFirst ? 1.0 / unit_s_ : 2.0 / (unit_s_ * unit_s_);
   return scale * coefficients.row(order_).transpose();
 }

@@ -9,9 +9,11 @@
 
 namespace camgyro {
 
-// The first or the second, of least-squares parabolas over 25 ms (at least 2 samples) to both sides
-// of each sample; zero at the ends. Made where they are asked for: hours have millions of samples,
-// of which a fit uses few.
+// The first or the second, of least-squares polynomials of fourth degree over 40 ms (at least 3
+// samples) to both sides of each sample; zero at the ends. They see 0.2 % too little of a rotation
+// of 4 Hz; parabolas over 25 ms, which let a fifth less noise through, see 5 and 3 % too little,
+// more than three sigmas of what 40 s of running tell. Made where they are asked for: hours have
+// millions of samples, of which a fit uses few.
 class RateDerivatives {
  public:
   enum Order { kFirst = 1, kSecond = 2 };
