@@ -272,24 +272,9 @@ class CalibrationJob {
           Format("the recording is long: %zu of %zu pairs, those that tell most, are refined",
                  refined_pairs_.size(), input_.pairs.size()));
     }
-    Calibration from = estimate_;
-    if (from.effects != nullptr &&
-        std::any_of(from.effects->items().begin(), from.effects->items().end(),
-                    [](const auto& item) { return item.effect->depends_on_calibration(); })) {
-      const Result<Refined> first = RefineWith(refinement, from, refinement.graph.sigma);
-      if (!first) return tl::unexpected(first.error());
-      from = SettleEffects(recording_, *first, [&](const Refined& fit) {
-               return RefineFrom(fit, refined_pairs_, refinement);
-             }).calibration;
-      if (online_) {  // all of it with these effects, not with those of the start
-        Calibration again = from_start_;
-        again.effects = from.effects;
-        MakePass(SelectPairs(recording_, kGapLimitsOnline), again, &online_);
-      }
-    }
     Status online;
     Beside rest_of_window([&] { online = FinishWindow(); });
-    Result<Refined> refined = RefineWith(refinement, from, refinement.graph.sigma);
+    Result<Refined> refined = RefineWith(refinement, estimate_, refinement.graph.sigma);
     rest_of_window.Wait();
     if (!online) return online;
     if (!refined && report_.online) {  // a window that has run away, to a lens without rays
@@ -298,9 +283,9 @@ class CalibrationJob {
       report_.notes.push_back(
           "the online estimate leads nowhere; all frames fitted from the start");
     }
-    if (!refined && from.effects != nullptr) {
+    if (!refined && estimate_.effects != nullptr) {
       refinement.graph.drop_without_ray = true;
-      refined = RefineWith(refinement, from, refinement.graph.sigma);
+      refined = RefineWith(refinement, estimate_, refinement.graph.sigma);
       if (refined) {
         report_.notes.push_back(
             "matches where the lens of the start has no ray, at the edge of the picture, are left "
@@ -308,6 +293,16 @@ class CalibrationJob {
       }
     }
     if (!refined) return tl::unexpected(refined.error());
+    if (HasToSettle(refined->calibration)) {
+      refined = SettleEffects(recording_, *refined, [&](const Refined& fit) {
+        return RefineFrom(fit, refined_pairs_, refinement);
+      });
+      // The online pass with these effects, not with those of the start.
+      Calibration again = from_start_;
+      again.effects = refined->calibration.effects;
+      if (online_) MakePass(SelectPairs(recording_, kGapLimitsOnline), again, &online_);
+      if (const Status done = FinishWindow(); !done) return done;
+    }
     TakeNoiseFactors(refined->noise_factors, &refined_pairs_);
     const Halves halves = LeaveOutWhatMoves(refinement, &*refined);
     report_.noise_factors = refined->noise_factors;

@@ -89,6 +89,12 @@ class Effect {
   virtual bool is_constant_lens() const { return false; }
   // Made from a calibration so exactly that it is to be made anew when that has moved.
   virtual bool depends_on_calibration() const { return false; }
+  // For an effect that is linear in its parameters only while they are small: the same one with
+  // columns that make its change at these values exact (secants). Null: it is linear, or near
+  // enough to where it is made for.
+  virtual std::shared_ptr<const Effect> LinearAbout(const double* /*values*/) const {
+    return nullptr;
+  }
   // An effect without parameters, that of every pair's latents instead: the standard deviation
   // which it needs their prior to have, in the latent's unit; 0: as it is.
   virtual double widened_sigma(PairLatent /*latent*/) const { return 0.0; }

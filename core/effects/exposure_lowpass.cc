@@ -18,7 +18,7 @@ class ExposureLowpass final : public Effect {
   ExposureLowpass(const EffectSetup& setup, bool recorded)
       : Effect(recorded ? std::vector<EffectParameter>{{"factor_sq", "", 4.0, 0.0, 4.0}}
                         : std::vector<EffectParameter>{{"exposure_sq", "s^2", 2e-3, 0.0, 4e-3}}),
-        derivatives_(setup, RateDerivatives::kSecond) {
+        derivatives_(setup) {
     const auto n = static_cast<Eigen::Index>(derivatives_.gyro().times_s.size());
     squares_.setOnes(n);
     if (!recorded) return;
@@ -35,7 +35,7 @@ class ExposureLowpass final : public Effect {
   }
   void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
     const Eigen::Index at = derivatives_.IndexAt(time_s);
-    if (at >= 0) columns = -squares_[at] / 24.0 * derivatives_.At(at);
+    if (at >= 0) columns = -squares_[at] / 12.0 * derivatives_.At(at).row(2).transpose();
   }
 
  private:

@@ -14,10 +14,9 @@ double MeanInterval(const std::vector<double>& times_s) {
 
 }  // namespace
 
-RateDerivatives::RateDerivatives(const EffectSetup& setup, Order order)
+RateDerivatives::RateDerivatives(const EffectSetup& setup)
     : gyro_(setup.gyro),
-      order_(order),
-      half_(std::max<Eigen::Index>(3, std::llround(0.04 / MeanInterval(gyro_->times_s)))),
+      half_(std::max<Eigen::Index>(3, std::llround(kReach_s / MeanInterval(gyro_->times_s)))),
       unit_s_(static_cast<double>(half_) * MeanInterval(gyro_->times_s)) {}
 
 Eigen::Index RateDerivatives::IndexAt(double time_gyro_s) const {
@@ -26,13 +25,13 @@ Eigen::Index RateDerivatives::IndexAt(double time_gyro_s) const {
   return it == times_s.end() ? -1 : it - times_s.begin();
 }
 
-Eigen::Vector3d RateDerivatives::At(Eigen::Index sample) const {
+RateDerivatives::Coefficients RateDerivatives::At(Eigen::Index sample) const {
   const std::vector<double>& times_s = gyro_->times_s;
   if (sample < half_ || sample + half_ >= static_cast<Eigen::Index>(times_s.size())) {
-    return Eigen::Vector3d::Zero();
+    return Coefficients::Zero();
   }
   Eigen::Matrix<double, 5, 5> A = Eigen::Matrix<double, 5, 5>::Zero();
-  Eigen::Matrix<double, 5, 3> B = Eigen::Matrix<double, 5, 3>::Zero();  // row: power, column: axis
+  Coefficients B = Coefficients::Zero();
   for (Eigen::Index j = sample - half_; j <= sample + half_; ++j) {
     const double t =
         (times_s[static_cast<size_t>(j)] - times_s[static_cast<size_t>(sample)]) / unit_s_;
@@ -40,9 +39,13 @@ Eigen::Vector3d RateDerivatives::At(Eigen::Index sample) const {
     A += powers * powers.transpose();
     B += powers * gyro_->values.col(j).transpose();
   }
-  const Eigen::Matrix<double, 5, 3> coefficients = A.ldlt().solve(B);
-  const double scale = order_ == kFirst ? 1.0 / unit_s_ : 2.0 / (unit_s_ * unit_s_);
-  return scale * coefficients.row(order_).transpose();
+  Coefficients coefficients = A.ldlt().solve(B);
+  double power = 1.0;
+  for (int k = 1; k < coefficients.rows(); ++k) {
+    power /= unit_s_;
+    coefficients.row(k) *= power;
+  }
+  return coefficients;
 }
 
 bool RateDerivatives::Possible(const EffectSetup& setup) {

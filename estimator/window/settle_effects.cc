@@ -7,14 +7,9 @@
 #include "estimator/window/estimation_input.h"
 
 namespace camgyro {
-namespace {
 
-// Makes those effects anew that depend on the calibration, in the shape that it says; false if
-// there are none.
-bool RemakeEffects(const Recording& recording, Calibration* calibration) {
-  if (calibration->effects == nullptr) return false;
+void RemakeEffects(const Recording& recording, Calibration* calibration) {
   auto set = std::make_shared<EffectSet>();
-  bool remade = false;
   const EffectSetup setup = MakeEffectSetup(recording, *calibration);
   for (const auto& item : calibration->effects->items()) {
     EffectSet::Item own = item;
@@ -24,21 +19,29 @@ bool RemakeEffects(const Recording& recording, Calibration* calibration) {
             own.entry->shape_by_fit(own.shape, calibration->effect_values.data() + own.first);
       }
       own.effect = own.entry->make(setup, own.shape);
-      remade = true;
+    } else if (auto about =
+                   own.effect->LinearAbout(calibration->effect_values.data() + own.first)) {
+      own.effect = std::move(about);
     }
     set->Add(own);
   }
   calibration->effects = set;
-  return remade;
 }
 
-}  // namespace
+bool HasToSettle(const Calibration& c) {
+  if (c.effects == nullptr) return false;
+  return std::any_of(
+      c.effects->items().begin(), c.effects->items().end(), [&](const EffectSet::Item& item) {
+        return item.effect->depends_on_calibration() ||
+               item.effect->LinearAbout(c.effect_values.data() + item.first) != nullptr;
+      });
+}
 
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {
   constexpr int kMostTimes = 5;
-  for (int i = 0; i < kMostTimes; ++i) {
+  for (int i = 0; i < kMostTimes && HasToSettle(fit.calibration); ++i) {
     Refined from = fit;
-    if (!RemakeEffects(recording, &from.calibration)) break;
+    RemakeEffects(recording, &from.calibration);
     Result<Refined> better = refit(from);
     if (!better) break;
     const Calibration& c = better->calibration;

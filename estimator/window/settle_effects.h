@@ -1,4 +1,4 @@
-// Effects that depend on the calibration which they are part of.
+// Effects that depend on the calibration which they are part of, or on their own values.
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_SETTLE_EFFECTS_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_SETTLE_EFFECTS_H_
 
@@ -10,8 +10,16 @@
 
 namespace camgyro {
 
-// A fit with those effects made anew that depend on the calibration, and refitted, until it stays
-// within a tenth of a sigma: what is left to gain by that would be taken for another effect's.
+// Makes those effects anew that depend on the calibration, in the shape that it says, or on their
+// values.
+void RemakeEffects(const Recording& recording, Calibration* calibration);
+
+// Are effects of it to be made anew, for the calibration that they depend on, or since they are
+// linear about other values?
+bool HasToSettle(const Calibration& calibration);
+
+// A fit with those effects made anew, and refitted, until it stays within a tenth of a sigma: what
+// is left to gain by that would be taken for another effect's.
 // `refit`: from where a fit ended, but for its effects; where it fails, the last fit stands.
 using Refit = std::function<Result<Refined>(const Refined& from)>;
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit);

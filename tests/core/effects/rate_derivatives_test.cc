@@ -33,15 +33,15 @@ TEST(RateDerivatives, SeeFourHertzWithin3In1000) {
   const Eigen::Vector3d frequency_hz(1.0, 2.5, 4.0);
   for (const double rate_hz : {100.0, 200.0, 1000.0}) {
     const EffectSetup setup = Tones(rate_hz, frequency_hz, 0.0);
-    const RateDerivatives first(setup, RateDerivatives::kFirst);
-    const RateDerivatives second(setup, RateDerivatives::kSecond);
+    const RateDerivatives rates(setup);
     for (double t = 0.1; t < 0.9; t += 0.01) {
-      const Eigen::Index at = first.IndexAt(10.0 + t);
+      const Eigen::Index at = rates.IndexAt(10.0 + t);
       const double sampled_s = setup.gyro->times_s[static_cast<size_t>(at)] - 10.0;
+      const RateDerivatives::Coefficients found = rates.At(at);
       for (int axis = 0; axis < 3; ++axis) {
         const double w = 2.0 * M_PI * frequency_hz[axis];
-        EXPECT_NEAR(first.At(at)[axis], w * std::cos(w * sampled_s), 0.003 * w);
-        EXPECT_NEAR(second.At(at)[axis], -w * w * std::sin(w * sampled_s), 0.003 * w * w);
+        EXPECT_NEAR(found(1, axis), w * std::cos(w * sampled_s), 0.003 * w);
+        EXPECT_NEAR(2.0 * found(2, axis), -w * w * std::sin(w * sampled_s), 0.003 * w * w);
       }
     }
   }
@@ -50,13 +50,12 @@ TEST(RateDerivatives, SeeFourHertzWithin3In1000) {
 // At 200 Hz, of white noise of 0.002 rad/s: 25.1 / s and 3267 / s^2 of it by the weights' norm.
 TEST(RateDerivatives, LetThroughAsMuchNoiseAsTheirWeightsSay) {
   const EffectSetup setup = Tones(200.0, Eigen::Vector3d::Zero(), 0.002);
-  const RateDerivatives first(setup, RateDerivatives::kFirst);
-  const RateDerivatives second(setup, RateDerivatives::kSecond);
+  const RateDerivatives rates(setup);
   double first_squared = 0.0, second_squared = 0.0;
   constexpr Eigen::Index kFrom = 8, kTo = 193;
   for (Eigen::Index i = kFrom; i < kTo; ++i) {
-    first_squared += first.At(i).squaredNorm() / (3.0 * (kTo - kFrom));
-    second_squared += second.At(i).squaredNorm() / (3.0 * (kTo - kFrom));
+    first_squared += rates.At(i).row(1).squaredNorm() / (3.0 * (kTo - kFrom));
+    second_squared += 4.0 * rates.At(i).row(2).squaredNorm() / (3.0 * (kTo - kFrom));
   }
   EXPECT_NEAR(std::sqrt(first_squared), 25.1 * 0.002, 0.15 * 25.1 * 0.002);
   EXPECT_NEAR(std::sqrt(second_squared), 3267.0 * 0.002, 0.15 * 3267.0 * 0.002);
@@ -64,11 +63,11 @@ TEST(RateDerivatives, LetThroughAsMuchNoiseAsTheirWeightsSay) {
 
 TEST(RateDerivatives, AreZeroAtTheEndsAndNotPossibleOfSlowGyros) {
   const EffectSetup setup = Tones(200.0, Eigen::Vector3d::Constant(2.0), 0.0);
-  const RateDerivatives first(setup, RateDerivatives::kFirst);
-  EXPECT_EQ(first.IndexAt(11.001), -1);
-  EXPECT_TRUE(first.At(0).isZero(0.0));
-  EXPECT_TRUE(first.At(200).isZero(0.0));
-  EXPECT_FALSE(first.At(8).isZero(0.0));
+  const RateDerivatives rates(setup);
+  EXPECT_EQ(rates.IndexAt(11.001), -1);
+  EXPECT_TRUE(rates.At(0).isZero(0.0));
+  EXPECT_TRUE(rates.At(200).isZero(0.0));
+  EXPECT_FALSE(rates.At(8).isZero(0.0));
   EXPECT_TRUE(RateDerivatives::Possible(setup));
   EXPECT_FALSE(RateDerivatives::Possible(Tones(30.0, Eigen::Vector3d::Constant(2.0), 0.0)));
 }

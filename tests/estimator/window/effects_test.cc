@@ -9,6 +9,7 @@
 #include "estimator/window/direction_search.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
+#include "estimator/window/settle_effects.h"
 #include "factors/coplanarity_plane.h"
 #include "simulation/simulate.h"
 
@@ -102,6 +103,10 @@ TEST_P(EffectAgainstSimulator, FitsItsPixels) {
     }
     calibration.bias_gyro_rad_s += mean.cwiseProduct(calibration.effect_values.head<3>());
   }
+  // Some are linear about their values only.
+  if (effects->items().front().entry->part == ModelPart::kRate) {
+    RemakeEffects(simulated->recording, &calibration);
+  }
   const double with = Rms(input, calibration);
   EXPECT_LT(with, without / test.gain) << "without " << without << " px, with " << with << " px";
 }
@@ -130,11 +135,16 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"gyro_misalignment",
              "effects.gyro_misalignment={xy: 0.01,xz: -0.008,yz: 0.006}",
              {0.01, -0.008, 0.006}},
-        // The time constant is in the delay; third order is neglected.
-        Case{"gyro_lowpass", "effects.gyro_lowpass={time_constant_s: 0.008}", {6.4e-5}, 4.0, 0.023},
+        // The time constant is in the delay.
+        Case{"gyro_lowpass",
+             "effects.gyro_lowpass={time_constant_s: 0.016}",
+             {2.56e-4},
+             30.0,
+             0.031},
         Case{"gyro_axis_delay",
-             "effects.gyro_axis_delay={y_after_x_s: 0.002,z_after_x_s: -0.001}",
-             {0.002, -0.001}},
+             "effects.gyro_axis_delay={y_after_x_s: 0.015,z_after_x_s: -0.01}",
+             {0.015, -0.01},
+             100.0},
         Case{"bias_drift:linear",
              "effects.bias_drift={rate_rad_s2: [0.005,-0.003,0.002]}",
              {0.005, -0.003, 0.002}},
