@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/format.h"
+#include "tools/report/parameter_rows.h"
 
 namespace camgyro {
 namespace {
@@ -79,10 +80,10 @@ std::string ValueText(const CandidateResult& c) {
   for (Eigen::Index k = 0; k < c.estimate.size() && k < 4; ++k) {
     if (k >= c.sigma.size()) break;
     const EffectParameter& p = c.parameter_info[static_cast<size_t>(k)];
-    const bool seconds = p.unit == "s";
-    text += Format("%s%s %.4g ± %.2g%s", k > 0 ? ", " : "", p.name.c_str(),
-                   (seconds ? 1e3 : 1.0) * c.estimate[k], (seconds ? 1e3 : 1.0) * c.sigma[k],
-                   p.unit.empty() ? "" : (" " + (seconds ? std::string("ms") : p.unit)).c_str());
+    const ReadableUnit unit = ReadableUnitOf(p.unit);
+    text +=
+        Format("%s%s %.4g ± %.2g%s", k > 0 ? ", " : "", p.name.c_str(), unit.scale * c.estimate[k],
+               unit.scale * c.sigma[k], unit.name.empty() ? "" : (" " + unit.name).c_str());
   }
   if (c.estimate.size() > 4)
     text += Format(", and %d more", static_cast<int>(c.estimate.size()) - 4);

@@ -8,6 +8,7 @@
 #include "tools/report/calibrate_report.h"
 #include "tools/report/charts.h"
 #include "tools/report/page.h"
+#include "tools/report/parameter_rows.h"
 
 namespace camgyro {
 namespace {
@@ -55,8 +56,9 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
     for (Eigen::Index k = 0; k < std::min<Eigen::Index>(4, c.estimate.size()); ++k) {
       if (k >= c.sigma.size()) break;
       const EffectParameter& p = c.parameter_info[static_cast<size_t>(k)];
-      parameters += Format("%s%s %.4g ± %.2g %s", k > 0 ? "; " : "", p.name.c_str(), c.estimate[k],
-                           c.sigma[k], p.unit.c_str());
+      const ReadableUnit unit = ReadableUnitOf(p.unit);
+      parameters += Format("%s%s %.4g ± %.2g %s", k > 0 ? "; " : "", p.name.c_str(),
+                           unit.scale * c.estimate[k], unit.scale * c.sigma[k], unit.name.c_str());
     }
     rounds.rows.push_back(
         Row({Format("%zu", i + 1),
@@ -122,7 +124,8 @@ ReportSection MapsSection(const Diagnosis& d) {
       chart.title = after.name + (inner == 3 ? std::string(", about gyro ") + "xyz"[part] : "") +
                     Format(" (p = %.2g)", after.p_value);
       chart.x_label = after.axis_unit;
-      chart.y_label = after.unit;
+      const ReadableUnit unit = ReadableUnitOf(after.unit);
+      chart.y_label = unit.name;
       chart.x = after.axis;
       for (const auto& [name, map] : {std::pair("before", before), {"after", &after}}) {
         if (map == nullptr || map->axis.size() != after.axis.size() ||
@@ -135,7 +138,8 @@ ReportSection MapsSection(const Diagnosis& d) {
         for (size_t i = 0; i < after.axis.size(); ++i) {
           const auto at = static_cast<Eigen::Index>(inner * i + part);
           const bool known = at < map->value.size();
-          series.y.push_back(known ? map->value[at] : std::numeric_limits<double>::quiet_NaN());
+          series.y.push_back(known ? unit.scale * map->value[at]
+                                   : std::numeric_limits<double>::quiet_NaN());
         }
         chart.series.push_back(std::move(series));
       }

@@ -27,7 +27,7 @@ std::string TableRow(const ParameterRow& row) {
          "\n";
 }
 
-// Each effect with its parameters, at most four of a kind; seconds as ms.
+// Each effect with its parameters, at most four of a kind.
 std::string EffectRows(const Calibration& c) {
   std::string rows;
   if (!c.effects) return rows;
@@ -40,13 +40,12 @@ std::string EffectRows(const Calibration& c) {
         break;
       }
       const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
-      const bool seconds = p.unit == "s";
+      const ReadableUnit unit = ReadableUnitOf(p.unit);
       const int column = item.first + k;
-      const double scale = seconds ? 1e3 : 1.0;
-      const double sigma = scale * std::sqrt(c.effect_covariance(column, column));
+      const double sigma = unit.scale * std::sqrt(c.effect_covariance(column, column));
       rows += Format("    %-20s %12.*f ± %-9.*f %s\n", p.name.c_str(), DecimalsFor(sigma),
-                     scale * c.effect_values[column], DecimalsFor(sigma), sigma,
-                     seconds ? "ms" : p.unit.c_str());
+                     unit.scale * c.effect_values[column], DecimalsFor(sigma), sigma,
+                     unit.name.c_str());
     }
   }
   return rows;

@@ -115,7 +115,7 @@ std::string TimesText(double ratio) {
   return ratio < 10.0 ? Format("%.1f", ratio) : Format("%.0f", ratio);
 }
 
-// Parameters of the effects in the model, in the units of calibration.yaml; empty without effects.
+// Parameters of the effects in the model; empty without effects.
 std::string EffectsTable(const Calibration& c) {
   if (!c.effects || c.effects->items().empty()) return "";
   ReportTable table;
@@ -125,14 +125,15 @@ std::string EffectsTable(const Calibration& c) {
     if (item.effect->size() == 0) table.rows.push_back({{item.entry->name, "", 0.0}});
     for (int k = 0; k < item.effect->size(); ++k) {
       const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
+      const ReadableUnit unit = ReadableUnitOf(p.unit);
       const double value = c.effect_values[item.first + k];
       const double sigma = std::sqrt(c.effect_covariance(item.first + k, item.first + k));
       const std::string key = Format("effects.%zu.parameters.%d.", i, k);
       table.rows.push_back({{k == 0 ? item.entry->name : "", "", 0.0},
                             {p.name, "", 0.0},
-                            {Format("%.4g", value), key + "value", value},
-                            {Format("%.2g", sigma), key + "sigma", sigma},
-                            {p.unit, "", 0.0}});
+                            {Format("%.4g", unit.scale * value), key + "value", value},
+                            {Format("%.2g", unit.scale * sigma), key + "sigma", sigma},
+                            {unit.name, "", 0.0}});
     }
   }
   return "<h3>Effects in the model</h3>\n" + TableHtml(table);

@@ -35,6 +35,12 @@ std::vector<ParameterRow> ParameterRows(const Calibration& c, const Eigen::Matri
   return rows;
 }
 
+ReadableUnit ReadableUnitOf(const std::string& unit) {
+  if (unit == "s") return {1e3, "ms"};
+  if (unit == "s^2") return {1e6, "ms^2"};
+  return {1.0, unit};
+}
+
 int DecimalsFor(double sigma) {
   if (!(sigma > 0.0)) return 6;
   return std::min(6, std::max(0, 1 - static_cast<int>(std::floor(std::log10(sigma)))));

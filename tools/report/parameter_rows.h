@@ -31,6 +31,13 @@ Eigen::Matrix3d MountingPermutation(const Calibration& calibration);
 std::vector<ParameterRow> ParameterRows(const Calibration& calibration,
                                         const Eigen::Matrix3d& permutation, bool attitudes);
 
+// The unit of an effect's parameter in calibration.yaml as people read it: ms for s.
+struct ReadableUnit {
+  double scale = 1.0;  // value in this unit / value in that of the file
+  std::string name;
+};
+ReadableUnit ReadableUnitOf(const std::string& unit);
+
 // Digits after the point that show two digits of the sigma, 0..6.
 int DecimalsFor(double sigma);
 
