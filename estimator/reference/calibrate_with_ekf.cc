@@ -1,7 +1,10 @@
 #include "estimator/reference/calibrate_with_ekf.h"
 
 #include <chrono>
+#include <string>
 #include <utility>
+
+#include "estimator/starting_point.h"
 
 namespace camgyro {
 
@@ -75,6 +78,17 @@ Result<CalibrationReport> CalibrateWithEkf(const Recording& recording,
   report.converged = true;
   report.notes.push_back(
       "the filter of Jia & Evans as published, for comparison: its sigmas are over-confident");
+  Calibration with_effects = start;
+  const Status added = AddStartEffects(recording, *found, "", ByPlane(), &with_effects);
+  if (added && with_effects.effects) {
+    std::string names;
+    for (const EffectSet::Item& item : with_effects.effects->items()) {
+      names += (names.empty() ? "" : ", ") + item.entry->name;
+    }
+    report.notes.push_back("the filter does not know " + names +
+                           ", which the start has found in this recording, or cannot rule out: its "
+                           "estimate may be off by that");
+  }
   return report;
 }
 
