@@ -376,7 +376,7 @@ TEST(AddStartEffects, ReadsColumnsOfTurnedPictures) {
   EXPECT_FALSE(reads_columns("", ByPlane()));
   std::swap(recording.camera.width_px, recording.camera.height_px);
   EXPECT_TRUE(reads_columns("", ByPlane()));
-  EXPECT_THAT(notes, testing::ElementsAre(HasSubstr("higher than wide")));
+  EXPECT_THAT(notes, testing::ElementsAre(testing::HasSubstr("higher than wide")));
   EXPECT_TRUE(reads_columns("readout_direction", ByPlane()));
   EXPECT_THAT(notes, testing::IsEmpty());
   EXPECT_FALSE(reads_columns("", ByTransfer()));
