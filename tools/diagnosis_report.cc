@@ -19,15 +19,16 @@ std::vector<TableCell> Row(const std::vector<std::string>& texts) {
   return row;
 }
 
+std::string StructureText(const Diagnosis& d) {
+  return "Structure is left that nothing in the catalogue explains: " + Joined(d.where);
+}
+
 ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
   std::string html =
       Paragraph(d.effects.empty() ? "No effect beyond " + NameOfModel(d) + " was found."
                                   : "Found: " + Joined(d.effects) + ".");
   if (!d.not_tested.empty()) html += Paragraph("Nothing was tested: " + d.not_tested + ".");
-  if (d.unexplained_structure) {
-    html += Paragraph(
-        "Structure is left that nothing in the catalogue explains: " + Joined(d.where) + ".");
-  }
+  if (d.unexplained_structure) html += Paragraph(StructureText(d) + ".");
   std::vector<std::string> faults;
   for (const DataFault& fault : d.faults) {
     faults.push_back(fault.name + ": " + fault.finding + ". What to do: " + fault.advice + ".");
@@ -153,8 +154,10 @@ ReportSection MapsSection(const Diagnosis& d) {
 
 Result<std::string> DiagnosisReportHtml(const Recording& recording, const SmallPictures& pictures,
                                         const Diagnosis& diagnosis, const RunInfo& run) {
+  CalibrationReport result = diagnosis.result();
+  if (diagnosis.unexplained_structure) result.doubts.push_back(StructureText(diagnosis));
   Result<std::vector<ReportSection>> sections =
-      CalibrationSections(recording, pictures, diagnosis.result(), run);
+      CalibrationSections(recording, pictures, result, run);
   if (!sections) return tl::unexpected(sections.error());
   sections->insert(sections->begin(), VerdictSection(diagnosis, recording.HasOnlyAttitudes()));
   if (!diagnosis.maps_after.empty()) {

@@ -330,6 +330,10 @@ TEST_F(CommandsTest, DiagnoseMeasuredAttitudesWithoutAName) {
     const YAML::Node verdict = YAML::LoadFile(Path("result/diagnosis.yaml"))["verdict"];
     EXPECT_EQ(verdict["effects"].size(), 0u) << name;
     EXPECT_TRUE(verdict["unexplained_structure"].as<bool>()) << name;
+    // Which the report does not call sound.
+    const std::string report = ReadFile(Path("result/report.html"));
+    EXPECT_THAT(report, HasSubstr("take the result with care"));
+    EXPECT_THAT(report, Not(HasSubstr("A sound calibration")));
   }
 }
 
