@@ -31,7 +31,7 @@ class GyroLowpass final : public Effect {
   std::shared_ptr<const Effect> LinearAbout(const double* values) const override {
     // What is neglected delays a rotation of 4 Hz by (2 pi 4 Hz)^2 T^3/3 = 13 us for 4 ms.
     constexpr double kLinear_s = 4e-3;
-    constexpr double kSame_s = 2e-5;
+    constexpr double kSame_s = 2e-5;  // below its sigma in 40 s of running
     const double to_s = std::min(std::sqrt(std::max(0.0, values[0])), RateDerivatives::kReach_s);
     if (std::abs(to_s - about_s_) < (about_s_ == 0.0 ? kLinear_s : kSame_s)) return nullptr;
     return std::make_shared<GyroLowpass>(derivatives_, to_s);
