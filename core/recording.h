@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/lens.h"
+#include "core/lens_shift.h"
 #include "core/result.h"
 
 namespace camgyro {
@@ -163,6 +164,8 @@ struct Recording {
   std::vector<Frame> frames;       // stamps strictly increasing
   std::vector<GyroSample> gyro;    // stamps strictly increasing
   std::vector<AccelSample> accel;  // empty, or stamps strictly increasing
+  // Of a stabilised lens that was logged; empty, or stamps strictly increasing.
+  std::vector<LensSample> lens_shift;
 
   // Image motion, in the order of preference; what is empty is absent.
   std::vector<FramePair> matches;                 // pairwise matches without identity

@@ -51,6 +51,15 @@ std::string TracksCsvRows(int64_t stamp_ns, const std::vector<TrackedPoint>& tra
   return csv;
 }
 
+std::string LensShiftCsv(const std::vector<LensSample>& samples) {
+  std::string csv = "#timestamp [ns],shift_x [px],shift_y [px]\n";
+  for (const LensSample& sample : samples) {
+    csv += Format("%lld,%.6f,%.6f\n", Stamp(sample.stamp_ns), sample.shift_px.x(),
+                  sample.shift_px.y());
+  }
+  return csv;
+}
+
 void WriteTracksCsv(const Recording& recording, int decimals, std::ostream* out) {
   *out << TracksCsvHeader();
   for (size_t i = 0; i < recording.tracks.size(); ++i) {

@@ -21,6 +21,9 @@ std::string TracksCsvHeader();
 std::string TracksCsvRows(int64_t stamp_ns, const std::vector<TrackedPoint>& tracks, int decimals);
 void WriteTracksCsv(const Recording& recording, int decimals, std::ostream* out);
 
+// cam0/lens_shift.csv: stamps [ns], shift of the picture by the lens [px].
+std::string LensShiftCsv(const std::vector<LensSample>& samples);
+
 // imu0/data.csv: rates [rad/s] and, if the recording has an accelerometer, specific forces [m/s^2],
 // all at the gyro's stamps: between its own samples the specific force is interpolated, and gyro
 // samples before the first or after the last of them are left out.

@@ -55,9 +55,8 @@ bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start)
 bool LensFollowsTurns(const Calibration& calibration) {
   if (calibration.effects == nullptr) return false;
   const auto& items = calibration.effects->items();
-  return std::any_of(items.begin(), items.end(), [](const EffectSet::Item& item) {
-    return item.entry->part == ModelPart::kLens && item.effect->depends_on_calibration();
-  });
+  return std::any_of(items.begin(), items.end(),
+                     [](const EffectSet::Item& item) { return item.effect->hides_turns(); });
 }
 
 double NoiseOverSmooth(const Recording& recording, double noise_px) {

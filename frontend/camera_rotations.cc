@@ -53,6 +53,36 @@ std::optional<GyroRotation> RoughRotation(const Recording& recording, const Fram
   return GyroRotation::Between(recording.gyro, camera, stamp_a_ns, stamp_b_ns);
 }
 
+// A logged shift of the lens, taken out of pairs: each match as if the lens had been at rest. The
+// log's own scale and time are good enough for rotations.
+class LensAtRest {
+ public:
+  explicit LensAtRest(const Recording& recording)
+      : recording_(recording),
+        shift_(recording.lens_shift, recording.frames.front().stamp_ns),
+        usual_readout_s_(recording.camera.readout_s.value_or(
+            0.5 * std::min(1.0 / 30.0, MedianInterval(recording.frames)))) {}
+
+  FramePair Of(FramePair pair, const RotationTrial& trial) const {
+    const double readout_s = trial.rough ? trial.rough->readout_s : usual_readout_s_;
+    const auto put_back = [&](int frame, Eigen::Vector2d* px) {
+      const double time_s = SecondsSince(recording_.frames.front().stamp_ns,
+                                         recording_.frames[static_cast<size_t>(frame)].stamp_ns);
+      *px -= shift_.At(time_s + readout_s * px->y() / recording_.camera.height_px);
+    };
+    for (Match& match : pair.matches) {
+      put_back(pair.frame_a, &match.px_a);
+      put_back(pair.frame_b, &match.px_b);
+    }
+    return pair;
+  }
+
+ private:
+  const Recording& recording_;
+  const LensShift shift_;
+  const double usual_readout_s_;
+};
+
 }  // namespace
 
 std::vector<FramePair> PairsForRotations(const Recording& recording, size_t max_pairs) {
@@ -102,11 +132,15 @@ std::vector<std::vector<CameraRotation>> CameraRotationsOf(
   }
   const Lens& model = GetLens(recording.camera.distortion_model);
   const size_t most = trials.size() > 1 ? kMatchesOfScan : std::numeric_limits<size_t>::max();
+  std::optional<LensAtRest> lens_at_rest;
+  if (!recording.lens_shift.empty()) lens_at_rest.emplace(recording);
   std::vector<std::vector<std::optional<CameraRotation>>> found(pairs.size());
   ParallelFor(pairs.size(), [&](size_t i) {
-    const FramePair pair = Thinned(pairs[i], most);
+    const FramePair seen = Thinned(pairs[i], most);
+    FramePair pair = seen;
     std::optional<TwoViewMotion> motion;
     for (size_t k = 0; k < trials.size(); ++k) {
+      if (lens_at_rest) pair = lens_at_rest->Of(seen, trials[k]);
       std::optional<GyroRotation> gyro;
       if (trials[k].rough) gyro = RoughRotation(recording, pair, *trials[k].rough, cameras[k]);
       const bool is_near =

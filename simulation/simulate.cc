@@ -335,6 +335,26 @@ Calibration Truth(const Scenario& scenario) {
 
 }  // namespace
 
+namespace {
+
+// As a phone has it in the results of its frames: on the camera's clock, from before the first one
+// until after the last.
+void AddLensShift(const Scenario& scenario, Simulated* result) {
+  const OpticalStabilisation& lens = scenario.effects.optical_stabilisation;
+  if (!lens.active() || lens.log_hz == 0.0) return;
+  constexpr double kAround_s = 0.1;
+  const double from_s = result->frames.front().timing.stamp_s - kAround_s;
+  const double to_s = result->frames.back().timing.stamp_s + kAround_s;
+  for (int k = 0; from_s + k / lens.log_hz < to_s; ++k) {
+    const double stamp_s = from_s + k / lens.log_hz;
+    result->recording.lens_shift.push_back(
+        {StampAt(scenario.start_ns, stamp_s),
+         result->camera->StabiliserShift(stamp_s + scenario.camera.delay_s)});
+  }
+}
+
+}  // namespace
+
 Result<Simulated> SimulateSensors(const Scenario& scenario) {
   Simulated result;
   std::mt19937_64 random = MakeRandom(scenario.seed, kMotionStream);
@@ -346,6 +366,7 @@ Result<Simulated> SimulateSensors(const Scenario& scenario) {
   random = MakeRandom(scenario.seed, kGyroStream);
   SimulatedGyro sensors = SimulateGyro(scenario, **trajectory, &random);
   AddFrames(scenario, sensors, &result);
+  AddLensShift(scenario, &result);
   if (Status inside = CheckInside(result, scenario.scene); !inside) {
     return tl::unexpected(inside.error());
   }

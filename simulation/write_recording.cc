@@ -218,13 +218,13 @@ Status WritePictures(const Simulated& s, const Scenario& scenario, const fs::pat
 }
 
 // Pictures or tracks of another recording in the folder would be taken for this one's.
-Status CheckFolder(const Scenario& scenario, const fs::path& cam) {
+Status CheckFolder(const Scenario& scenario, bool has_lens_shift, const fs::path& cam) {
   const VideoFormat format = scenario.video.format;
   for (const auto& [name, ours] :
        {std::pair("tracks.csv", format == VideoFormat::kNone),
         std::pair("video.mp4", format == VideoFormat::kMp4),
         std::pair("data", format == VideoFormat::kPng), std::pair("matches.csv", false),
-        std::pair("attitude.csv", false)}) {
+        std::pair("attitude.csv", false), std::pair("lens_shift.csv", has_lens_shift)}) {
     if (ours || !fs::exists(cam / name)) continue;
     return BadInput((cam / name).string() +
                     ": belongs to another recording; expected a new or empty folder");
@@ -239,12 +239,19 @@ Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
                       const std::function<void(size_t, size_t)>& progress) {
   const fs::path root(folder);
   try {
-    if (Status status = CheckFolder(scenario, root / "cam0"); !status) return status;
+    if (Status status =
+            CheckFolder(scenario, !simulated.recording.lens_shift.empty(), root / "cam0");
+        !status)
+      return status;
     fs::create_directories(root / "cam0");
     fs::create_directories(root / "imu0");
     Status status = WriteFrames(simulated, scenario, root / "cam0");
     if (status && scenario.video.format == VideoFormat::kNone) {
       status = WriteTracks(simulated, scenario, root / "cam0/tracks.csv");
+    }
+    if (status && !simulated.recording.lens_shift.empty()) {
+      status =
+          WriteText(root / "cam0/lens_shift.csv", LensShiftCsv(simulated.recording.lens_shift));
     }
     if (status) status = WriteText(root / "imu0/data.csv", ImuCsv(simulated.recording));
     if (status) status = WriteSensorYaml(simulated, scenario, root);

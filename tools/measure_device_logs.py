@@ -22,10 +22,12 @@ SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 DATA = os.environ.get("CAMGYRO_DATA", os.path.join(os.path.dirname(SOURCE), "shared/data"))
 SEEDS = (1, 2, 3)
 LENS = ["effects.optical_stabilisation.logged_px=0.3175"]
+LOGGED = [*LENS, "effects.optical_stabilisation.log_hz=250"]
 # Name, scenario, folder, what differs, flags of calibrate.
 RUNS = (("Nexus S", "log_nexus_s", "timing-nexus-s", [], []),
         ("Pixel, its lens held", "log_pixel", "timing-pixel-ois", [], []),
         ("Pixel, its lens as logged", "log_pixel", "timing-pixel-ois", LENS, []),
+        ("the same, with the log in the recording", "log_pixel", "timing-pixel-ois", LOGGED, []),
         ("the same, `optical_stabilisation:0.5`", "log_pixel", "timing-pixel-ois", LENS,
          ["--effects=optical_stabilisation:0.5"]),
         ("the same, `optical_stabilisation:0.5/0.025`", "log_pixel", "timing-pixel-ois", LENS,

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/lens.h"
+#include "core/lens_shift.h"
 #include "core/optical_stabiliser.h"
 
 namespace camgyro {
@@ -89,6 +90,9 @@ class Effect {
   virtual bool is_constant_lens() const { return false; }
   // Made from a calibration so exactly that it is to be made anew when that has moved.
   virtual bool depends_on_calibration() const { return false; }
+  // Made of the gyro's rates, it takes turns of the camera out of the picture: rotations between
+  // pictures then tell no focal length.
+  virtual bool hides_turns() const { return false; }
   // For an effect that is linear in its parameters only while they are small: the same one with
   // columns that make its change at these values exact (secants). Null: it is linear, or near
   // enough to where it is made for.
@@ -133,6 +137,8 @@ struct EffectSetup {
   std::optional<OpticalStabiliser> stabiliser;
   double stabiliser_px_per_rad = 0.0;
   bool lens_is_held = false;
+  // Where a stabilised lens was, logged; times as the frames' stamps. Null: nobody logged it.
+  std::shared_ptr<const LensShift> lens_shift;
   // Standard deviation of the frames' stamps around a clock where they are times of arrival [s]; 0:
   // they are not, or nobody has looked.
   double frame_stamp_jitter_s = 0.0;

@@ -1,13 +1,16 @@
 // A lens group that moves against fast rotation.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/effects/entries.h"
+#include "core/format.h"
 #include "core/optical_stabiliser.h"
 
 namespace camgyro {
@@ -117,6 +120,7 @@ class OpticalStabilisation final : public Effect {
     }
   }
   bool depends_on_calibration() const override { return true; }
+  bool hides_turns() const override { return true; }
   void SetStart(double* values) const override { values[kOfShift] = found_px_per_rad_; }
 
  private:
@@ -127,12 +131,63 @@ class OpticalStabilisation final : public Effect {
   std::vector<Eigen::Matrix2Xd> angles_;  // of each parameter
 };
 
-// That which the start has found, if it has. Else those of a Pixel: without its stop, and with it,
-// where the motion is so large.
+// The shape of a lens whose shift was logged: how late the log is, in seconds, after a slash. A log
+// that is more than this late is of something else.
+constexpr char kLogged[] = "logged";
+constexpr double kMostLate_s = 0.1;
+
+std::string NameOfLogged(double late_s) {
+  const double whole_us = std::round(1e6 * late_s);
+  return whole_us == 0.0 ? kLogged : kLogged + Format("/%.6g", 1e-6 * whole_us);
+}
+
+// How late a log of such a shape is; nothing for the name of another shape.
+std::optional<double> LateOf(const std::string& shape) {
+  if (shape == kLogged) return 0.0;
+  const std::string begin = std::string(kLogged) + "/";
+  if (shape.compare(0, begin.size(), begin) != 0) return std::nullopt;
+  char* end = nullptr;
+  const double late_s = std::strtod(shape.c_str() + begin.size(), &end);
+  const bool good = shape.size() > begin.size() && *end == 0 && std::abs(late_s) <= kMostLate_s;
+  return good ? std::optional<double>(late_s) : std::nullopt;
+}
+
+// The lens was where the log has it, but for its unit, how late the log is, and how the sensor lies
+// to its axes. Nothing of it depends on the gyro.
+class LoggedLens final : public Effect {
+ public:
+  enum { kScale, kLate, kCross, kDifference, kSize };
+
+  LoggedLens(const EffectSetup& setup, double late_s)
+      : Effect({{"logged_scale", "1", 1.0, 0.3, 3.0},
+                {"log_lag", "s", 0.01, -kMostLate_s, kMostLate_s},
+                {"cross_axis", "1", 0.1, -1.0, 1.0},
+                {"axis_difference", "1", 0.1, -1.0, 1.0}}),
+        shift_(setup.lens_shift),
+        readout_s_(setup.readout_s),
+        late_s_(late_s) {}
+  void ChangeLens(const Observation& o, LensColumns columns) const override {
+    const double t = o.frame.stamp_s + o.frame.offset_s + readout_s_ * o.px.y() / o.size_px.y();
+    const Eigen::Vector2d shift = shift_->At(t + late_s_);
+    columns.middleRows<2>(kCx) << shift, shift_->RateAt(t + late_s_),
+        Eigen::Vector2d(-shift.y(), shift.x()), Eigen::Vector2d(shift.x(), -shift.y());
+  }
+  bool depends_on_calibration() const override { return true; }  // the readout time
+  void SetStart(double* values) const override { values[kScale] = 1.0; }
+
+ private:
+  const std::shared_ptr<const LensShift> shift_;
+  const double readout_s_, late_s_;
+};
+
+// That which was logged, or that which the start has found, if it has. Else those of a Pixel:
+// without its stop, and with it, where the motion is so large.
 std::vector<std::string> ShapesFor(const EffectSetup& setup) {
   const OpticalStabiliser pixel = {0.5, 0.025};
   constexpr double kAtStop = 0.05;  // the lens is there for at least so much of the time
-  if (!setup.has_pixels || setup.lens_is_held) return {};
+  if (!setup.has_pixels) return {};
+  if (setup.lens_shift) return {kLogged};
+  if (setup.lens_is_held) return {};
   if (setup.stabiliser) return {NameOf(*setup.stabiliser)};
   const OpticalStabiliser without = {pixel.corner_hz};
   std::vector<std::string> shapes = {NameOf(without)};
@@ -142,11 +197,19 @@ std::vector<std::string> ShapesFor(const EffectSetup& setup) {
   return shapes;
 }
 
-// The stabiliser that a fit says: its shape with the changes that the values are. A fit far from
-// the lens is no measure of it, so that changes are bounded, and it is asked again from there.
+// The stabiliser that a fit says, or how late it says the log is: the shape with the changes that
+// the values are. A fit far from the lens is no measure of it, so that changes are bounded, and it
+// is asked again from there.
 std::string ShapeByFit(const std::string& shape, double* values) {
   constexpr double kMostLog = 0.5;
   constexpr double kLeastShift_px = 1.0;  // per rad
+  constexpr double kLeastScale = 0.1;     // of a log
+  if (const std::optional<double> late_s = LateOf(shape)) {
+    if (!(values[LoggedLens::kScale] > kLeastScale)) return shape;
+    const double more_s =
+        std::exchange(values[LoggedLens::kLate], 0.0) / values[LoggedLens::kScale];
+    return NameOfLogged(std::clamp(*late_s + more_s, -kMostLate_s, kMostLate_s));
+  }
   std::optional<OpticalStabiliser> s = StabiliserOf(shape);
   if (!s || !(values[kOfShift] > kLeastShift_px)) return shape;
   const auto factor = [&](double change) {
@@ -163,7 +226,8 @@ std::string ShapeByFit(const std::string& shape, double* values) {
 
 }  // namespace
 
-// Shapes: the corner frequency in Hz, and how far the lens goes in rad, if it has stops.
+// Shapes: the corner frequency in Hz, and how far the lens goes in rad, if it has stops; or
+// `logged`, with how late the log is.
 EffectEntry OpticalStabilisationEntry() {
   EffectEntry entry = {"optical_stabilisation", ModelPart::kLens,
                        "the lens moves against fast rotation, so that the picture turns less "
@@ -173,8 +237,15 @@ EffectEntry OpticalStabilisationEntry() {
   entry.leads_astray = true;
   entry.shapes = ShapesFor;
   entry.shape_by_fit = ShapeByFit;
+  entry.found_at_start = [](const EffectSetup& setup) {
+    return setup.has_pixels && setup.lens_shift != nullptr;
+  };
   entry.make = [](const EffectSetup& setup,
                   const std::string& shape) -> std::shared_ptr<const Effect> {
+    if (const std::optional<double> late_s = LateOf(shape)) {
+      if (!setup.has_pixels || !setup.lens_shift) return nullptr;
+      return std::make_shared<LoggedLens>(setup, *late_s);
+    }
     const std::optional<OpticalStabiliser> stabiliser = StabiliserOf(shape);
     if (!setup.has_pixels || !stabiliser) return nullptr;
     return std::make_shared<OpticalStabilisation>(setup, *stabiliser);

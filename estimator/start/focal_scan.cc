@@ -357,7 +357,7 @@ Result<StartResult> FindStartAndFocal(const Recording& recording,
   }
   Result<StartResult> start = ScanUsualAndTele(recording, rotations_at, options, scan_options);
   if (!start) return start;
-  LookForStabiliser(recording, rotations_at, &*start);
+  if (recording.lens_shift.empty()) LookForStabiliser(recording, rotations_at, &*start);
   if (!start->focal->determined) {
     start->notes.push_back(
         "the focal length is not determined (too little pan and tilt, or a distorting lens); " +

@@ -130,6 +130,9 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
       setup.frame_delays_s.push_back(DelayOf(calibration, frame));
     }
   }
+  if (!recording.lens_shift.empty()) {
+    setup.lens_shift = std::make_shared<LensShift>(recording.lens_shift, origin_ns);
+  }
   auto gyro = std::make_shared<SensorSamples>();
   gyro->values.resize(3, static_cast<Eigen::Index>(recording.gyro.size()));
   for (const GyroSample& sample : recording.gyro) {

@@ -12,6 +12,7 @@
 #include "frontend/readers/image_file.h"
 #include "frontend/readers/imu_csv.h"
 #include "frontend/readers/inside_folder.h"
+#include "frontend/readers/lens_shift.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sensor_yaml.h"
 #include "frontend/readers/text.h"
@@ -24,16 +25,16 @@ namespace fs = std::filesystem;
 
 // The files of cam0/ that exist; empty names for those that do not.
 struct CameraFiles {
-  std::string data, images, video, tracks, matches, attitude, yaml;
+  std::string data, images, video, tracks, matches, attitude, lens_shift, yaml;
 };
 
 CameraFiles FindCameraFiles(const fs::path& cam) {
   const auto existing = [&](const char* name) {
     return fs::exists(cam / name) ? (cam / name).string() : std::string();
   };
-  return {existing("data.csv"),          (cam / "data").string(), existing("video.mp4"),
-          existing("tracks.csv"),        existing("matches.csv"), existing("attitude.csv"),
-          (cam / "sensor.yaml").string()};
+  return {existing("data.csv"),       (cam / "data").string(),       existing("video.mp4"),
+          existing("tracks.csv"),     existing("matches.csv"),       existing("attitude.csv"),
+          existing("lens_shift.csv"), (cam / "sensor.yaml").string()};
 }
 
 Status AddImages(const CameraFiles& files, const FrameTable& table, Recording* recording) {
@@ -136,6 +137,7 @@ Status ReadCamera(const fs::path& cam, Recording* recording) {
   if (!files.tracks.empty()) status = ReadTracks(files.tracks, recording);
   if (status && !files.matches.empty()) status = ReadMatches(files.matches, recording);
   if (status && !files.attitude.empty()) status = ReadAttitudes(files.attitude, recording);
+  if (status && !files.lens_shift.empty()) status = ReadLensShift(files.lens_shift, recording);
   return status;
 }
 

@@ -1,5 +1,7 @@
 #include "frontend/readers/recording_yaml_reader.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -12,6 +14,7 @@
 #include "frontend/readers/formats.h"
 #include "frontend/readers/image_file.h"
 #include "frontend/readers/inside_folder.h"
+#include "frontend/readers/lens_shift.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/sample_rows.h"
 #include "frontend/readers/sensor_yaml.h"
@@ -29,7 +32,8 @@ constexpr double kLargestOffsetS = 4e9;  // 126 years: clocks that count from di
 
 using Units = std::map<std::string, double>;
 
-// One section of recording.yaml (gyro, accel, camera, bag), with the look-ups that they share.
+// One section of recording.yaml (gyro, accel, camera, lens_shift, bag), with the look-ups that they
+// share.
 class Section {
  public:
   Section(const std::string& yaml, const YAML::Node& root, const std::string& name)
@@ -91,14 +95,18 @@ class Section {
   }
 
   std::array<size_t, 3> VectorColumns(CsvReader* csv) {
-    const char* expected = "[x, y, z], three names or numbers of columns";
+    return Columns<3>("[x, y, z], three names or numbers of columns", csv);
+  }
+
+  template <size_t kSize>
+  std::array<size_t, kSize> Columns(const std::string& expected, CsvReader* csv) {
     const std::vector<std::string> names = keys_.Texts("columns", expected);
-    if (names.size() == 3) {
-      return {csv->NamedOrNumbered(names[0]), csv->NamedOrNumbered(names[1]),
-              csv->NamedOrNumbered(names[2])};
+    std::array<size_t, kSize> columns = {};
+    if (names.size() != kSize) keys_.Fail("columns", "expected " + expected);
+    for (size_t i = 0; i < std::min(kSize, names.size()); ++i) {
+      columns[i] = csv->NamedOrNumbered(names[i]);
     }
-    keys_.Fail("columns", Concat("expected ", expected));
-    return {};
+    return columns;
   }
 
   // The first thing that is wrong in the section or in its table.
@@ -206,6 +214,30 @@ Status ReadCamera(Section section, Recording* recording) {
   return status ? order.Mend(table.empty() ? video : table, recording) : status;
 }
 
+// Where the lens was, after the camera, whose pixels and frames it needs.
+Status ReadLens(Section section, Recording* recording) {
+  section.keys().AllowOnly(
+      {"file", "separator", "time", "time_unit", "time_offset_s", "columns", "px_per_unit"});
+  const std::string file = section.File("file");
+  if (section.status() && file.empty())
+    section.keys().Fail("file", "is missing below `lens_shift`");
+  if (!section.status()) return section.status();
+  CsvReader csv = section.Table(file);
+  SampleColumns columns;
+  section.Time(&csv, &columns);
+  const std::array<size_t, 2> at =
+      section.Columns<2>("[x, y], two names or numbers of columns", &csv);
+  const double px_per_unit = section.keys().Number("px_per_unit").value_or(1.0);
+  if (Status good = section.Check(csv); !good) return good;
+  std::vector<LensSample> samples;
+  while (csv.NextRow()) {
+    const int64_t stamp_ns = csv.Time(columns.time, columns.time_unit_s, columns.time_offset_ns);
+    samples.push_back(
+        {stamp_ns, px_per_unit * Eigen::Vector2d(csv.Number(at[0]), csv.Number(at[1]))});
+  }
+  return csv.status() ? SetLensShift(file, std::move(samples), recording) : csv.status();
+}
+
 // What the section `bag` names.
 struct NamedBag {
   std::string file;
@@ -233,7 +265,7 @@ Result<NamedBag> FindBag(Section section) {
 Result<Recording> ReadSections(const std::string& yaml, const YAML::Node& root) {
   if (!root.IsMap()) return BadInput(yaml + ":1: expected lines of `key: value`");
   YamlKeys keys(yaml, root);
-  keys.AllowOnly({"gyro", "accel", "camera", "bag"});
+  keys.AllowOnly({"gyro", "accel", "camera", "lens_shift", "bag"});
   if (root["bag"].IsDefined()) {
     keys.AllowOnly({"bag"});
     if (!keys.status()) return tl::unexpected(keys.status().error());
@@ -254,6 +286,8 @@ Result<Recording> ReadSections(const std::string& yaml, const YAML::Node& root) 
   if (status && accel.is_there()) status = ReadAccel(std::move(accel), &recording);
   if (status) status = ReadCamera(Section(yaml, root, "camera"), &recording);
   if (status) status = CheckFrames(yaml + ": camera", recording.frames);
+  Section lens(yaml, root, "lens_shift");
+  if (status && lens.is_there()) status = ReadLens(std::move(lens), &recording);
   if (!status) return tl::unexpected(status.error());
   NoteClocks(&recording);
   return recording;

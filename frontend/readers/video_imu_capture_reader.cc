@@ -3,6 +3,7 @@
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/wire_format_lite.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -13,6 +14,7 @@
 #include "core/robust_statistics.h"
 #include "frontend/readers/add_pictures.h"
 #include "frontend/readers/frame_order.h"
+#include "frontend/readers/lens_shift.h"
 #include "frontend/readers/recording_checks.h"
 #include "frontend/readers/text.h"
 #include "frontend/readers/whole_file.h"
@@ -60,7 +62,7 @@ Status AddImuSample(const Place& place, const std::string& bytes, GyroCollector*
 }
 
 // The records of the file, one after the other, so that a file that is cut short tells where.
-Status ReadMeta(const std::string& file, Recording* recording,
+Status ReadMeta(const std::string& file, Recording* recording, int* sensor_width_px,
                 std::vector<video_imu::FrameInfo>* frames) {
   const Result<std::string> content = ReadWholeFile(file);
   if (!content) return tl::unexpected(content.error());
@@ -98,6 +100,7 @@ Status ReadMeta(const std::string& file, Recording* recording,
           recording->notes.push_back(
               Concat(file, ": optical image stabilisation was on: the principal point moves"));
         }
+        *sensor_width_px = camera.pre_correction_active_array_size().width();
         break;
       }
       case video_imu::VideoCaptureData::kImuFieldNumber:
@@ -162,6 +165,25 @@ Status MergeFrames(const std::string& file, const std::vector<video_imu::FrameIn
   return {};
 }
 
+// Where the lens was, if the phone says so, in pixels of the picture: the app's videos are as wide
+// as the sensor.
+Status AddLensPositions(const std::string& file, const std::vector<video_imu::FrameInfo>& infos,
+                        int sensor_width_px, Recording* recording) {
+  std::vector<LensSample> samples;
+  const double scale = recording->camera.width_px / std::max(1.0, 1.0 * sensor_width_px);
+  for (const video_imu::FrameInfo& info : infos) {
+    for (const video_imu::LensPosition& lens : info.ois_samples()) {
+      samples.push_back({lens.time_ns(), scale * Eigen::Vector2d(lens.x_shift(), lens.y_shift())});
+    }
+  }
+  if (samples.empty()) return {};
+  if (sensor_width_px > 0) return SetLensShift(file, std::move(samples), recording);
+  recording->notes.push_back(
+      file +
+      ": has no width of the sensor, so that its OIS_samples, in pixels of it, are not used");
+  return {};
+}
+
 }  // namespace
 
 Result<Recording> ReadVideoImuCapture(const std::string& folder) {
@@ -174,11 +196,13 @@ Result<Recording> ReadVideoImuCapture(const std::string& folder) {
   Recording recording;
   recording.path = folder;
   std::vector<video_imu::FrameInfo> infos;
-  Status status = ReadMeta(meta, &recording, &infos);
+  int sensor_width_px = 0;
+  Status status = ReadMeta(meta, &recording, &sensor_width_px, &infos);
   if (status) status = AddVideo(video, meta, meta, &recording);
   if (status) status = MergeFrames(meta, infos, &recording);
   if (status) status = CheckFrames(meta, recording.frames);
   if (status) status = FrameOrder().Mend(meta, &recording);
+  if (status) status = AddLensPositions(meta, infos, sensor_width_px, &recording);
   if (!status) return tl::unexpected(status.error());
   NoteClocks(&recording);
   return recording;

@@ -148,6 +148,32 @@ TEST(CalibrateRecording, MakesEffectsAnewThatDependOnTheDelay) {
   EXPECT_EQ(report->online->effects->items().front().shape, shape);
 }
 
+// A lens that goes where no high-pass has it, 20 px to and fro, is no difficulty where it was
+// logged: nothing of it is left, though the log counts in other pixels and is 5 ms late.
+TEST(CalibrateRecording, KnowsWhereALoggedLensWas) {
+  Scenario scenario = ShortScenario(12.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  scenario.effects.optical_stabilisation = {1.0, 0.3, 0.025};
+  scenario.effects.optical_stabilisation.log_hz = 250.0;
+  Simulated s = SimulateTracks(scenario).value();
+  for (LensSample& sample : s.recording.lens_shift) {
+    sample.shift_px *= 1.25;
+    sample.stamp_ns += 5'000'000;
+  }
+  const Result<CalibrationReport> report =
+      CalibrateRecording(s.recording, RotationsOfPictures(s.recording, 100), {});
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  const Calibration& c = report->calibration;
+  const StateVector error = ErrorInSigmas(c, s.truth);
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 3.5) << error.transpose();
+  EXPECT_NEAR(report->quality.noise_px, scenario.tracks.noise_px, 0.05 * scenario.tracks.noise_px);
+  EXPECT_THAT(report->doubts, ::testing::IsEmpty());
+  ASSERT_EQ(c.effects->items().size(), 1u);
+  EXPECT_THAT(c.effects->items().front().shape, ::testing::StartsWith("logged/0.00"));
+  EXPECT_NEAR(c.effect_values[0], 0.8, 3.5 * std::sqrt(c.effect_covariance(0, 0)));
+  EXPECT_LT(c.effect_covariance(0, 0), 0.01 * 0.01);
+}
+
 // What the stabiliser does follows the time of the frame, whatever else shifts that.
 TEST(CalibrateRecording, MakesEffectsAnewThatDependOnEffectsOnTime) {
   Scenario scenario = ShortScenario(12.0);

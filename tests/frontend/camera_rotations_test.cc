@@ -122,6 +122,40 @@ TEST(CameraRotationsOf, AGyroUndoesTheRollingShutter) {
   EXPECT_LT(with, 0.3 * without);
 }
 
+// A lens that holds the picture still takes turns out of it; where it was logged, they come back.
+TEST(CameraRotationsOf, PutsALoggedLensBack) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 6.0;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  scenario.effects.optical_stabilisation.gain = 0.9;
+  scenario.effects.optical_stabilisation.log_hz = 250.0;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const std::vector<FramePair> pairs = PairsForRotations(s.recording);
+  const auto rms_of = [&](const Recording& recording) {
+    const RoughAlignment rough{s.truth.q_gyro_cam, s.truth.bias_gyro_rad_s,
+                               s.truth.delay_s + 0.5 * s.truth.readout_s, 0.0, s.truth.readout_s};
+    const std::vector<CameraRotation> rotations =
+        CameraRotationsOf(recording, pairs, {{s.truth.lens[kFocal], rough}}).front();
+    double sum = 0.0;
+    int count = 0;
+    for (const CameraRotation& rotation : rotations) {
+      const auto between = GyroRotation::Between(s.recording.gyro, s.truth,
+                                                 s.recording.frames[rotation.frame_a].stamp_ns,
+                                                 s.recording.frames[rotation.frame_b].stamp_ns);
+      if (!between) continue;
+      const double angle_rad =
+          rotation.q_a_b.angularDistance(Eigen::Quaterniond(between->BetweenMiddleRows()));
+      sum += angle_rad * angle_rad;
+      ++count;
+    }
+    EXPECT_GT(count, 50);
+    return std::sqrt(sum / count);
+  };
+  Recording without = s.recording;
+  without.lens_shift.clear();
+  EXPECT_LT(rms_of(s.recording), 0.2 * rms_of(without));
+}
+
 // On a circle through a room the camera steps sideways all the time, past points at similar
 // distances. Taken for rotations, as they were in some of the pairs (5 mrad in the mean of all),
 // these steps add up to a turn that the gyro does not feel, and the start makes a bias of it.

@@ -41,8 +41,8 @@ Status ReadAll(const std::string& path) {
 }
 
 Status ReadCalibrationFile(const std::string& path) {
-  const Result<std::vector<std::string>> names = ReadEffectNames(path);
-  if (!names) return tl::unexpected(names.error());
+  const Result<std::vector<std::string>> effects = ReadEffectNames(path);
+  if (!effects) return tl::unexpected(effects.error());
   const Result<Calibration> calibration = ReadCalibration(path);
   if (!calibration) return tl::unexpected(calibration.error());
   return {};
@@ -94,6 +94,11 @@ Files Tables() {
       {{"cam0/matches.csv", "#a,b,u,v,u,v\n1000000000,1033000000,1,2,3,4\n"},
        {"cam0/attitude.csv", "1000000000,1,0,0,0\n1033000000,0.8,0.6,0,0\n1066000000,1,0,0,0\n"}});
 }
+Files WithLens() {
+  return With(
+      TrackRecording(),
+      {{"cam0/lens_shift.csv", "#t,x,y\n1000000000,1,2\n1033000000,-3.5,4\n1066000000,5,1e-1\n"}});
+}
 Files Images() {
   Files files = TrackRecording();
   files.erase("cam0/tracks.csv");
@@ -142,6 +147,7 @@ const std::vector<FuzzTarget>& AllTargets() {
       {"tracks_csv", "cam0/tracks.csv", "", TrackRecording, ReadAll},
       {"matches_csv", "cam0/matches.csv", "", Tables, ReadAll},
       {"attitude_csv", "cam0/attitude.csv", "", Tables, ReadAll},
+      {"lens_shift_csv", "cam0/lens_shift.csv", "", WithLens, ReadAll},
       {"sensor_yaml", "cam0/sensor.yaml", "", TrackRecording, ReadAll},
       {"picture", "cam0/data/a.png", "", Images, ReadAll, MorePictures},
       {"video", "cam0/video.mp4", "", Video, ReadAll},

@@ -126,6 +126,26 @@ TEST_F(DeviceLogTest, MovesTheLensAsItWasLogged) {
   EXPECT_THAT(ActiveEffects(scenario.effects), ::testing::ElementsAre("optical_stabilisation"));
 }
 
+// On the camera's clock, for all frames.
+TEST_F(DeviceLogTest, LogsItsLens) {
+  const Scenario scenario = Load({"log.lens_shift=lens.csv",
+                                  "effects.optical_stabilisation={logged_px: 0.25, log_hz: 200}"})
+                                .value();
+  const Simulated s = SimulateSensors(scenario).value();
+  const std::vector<LensSample>& samples = s.recording.lens_shift;
+  ASSERT_GT(samples.size(), 400u);
+  EXPECT_LT(samples.front().stamp_ns, s.recording.frames.front().stamp_ns);
+  EXPECT_GT(samples.back().stamp_ns, s.recording.frames.back().stamp_ns);
+  for (const size_t i : {size_t{0}, samples.size() / 2}) {
+    EXPECT_EQ(samples[i + 1].stamp_ns - samples[i].stamp_ns, 5'000'000);
+    const double time_s =
+        1e-9 * static_cast<double>(samples[i].stamp_ns - scenario.start_ns) + kDelayS;
+    EXPECT_LT((samples[i].shift_px - s.camera->StabiliserShift(time_s)).norm(), 1e-5);
+  }
+  EXPECT_TRUE(
+      SimulateSensors(Load({"log.lens_shift=lens.csv"}).value())->recording.lens_shift.empty());
+}
+
 TEST_F(DeviceLogTest, RefusesWhatIsNoLog) {
   const auto message = [&](std::vector<std::string> overrides) {
     const Result<Scenario> scenario = Load(std::move(overrides));

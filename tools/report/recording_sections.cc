@@ -58,6 +58,10 @@ std::vector<CameraRotation> RotationsOfNeighbours(const Recording& recording,
   }
   Recording shown;
   shown.camera = recording.camera;
+  if (!recording.lens_shift.empty()) {
+    shown.frames = recording.frames;
+    shown.lens_shift = recording.lens_shift;
+  }
   CameraGuess& camera = shown.camera;
   const LensParameters lens = calibration.FullLens();
   camera.aspect_ratio = lens[kAspect];

@@ -141,8 +141,52 @@ TEST(OpticalStabilisation, HasTheShapeThatTheStartHasFound) {
   EXPECT_EQ(start, 432.0 * Eigen::VectorXd::Unit(kWithStop, kShift));
 }
 
+// A lens that was logged is there, whatever the gyro says.
+TEST(OpticalStabilisation, TakesTheLensFromItsLog) {
+  EffectSetup setup = Circling(0.06);
+  const EffectEntry& entry = *FindEffect("optical_stabilisation");
+  EXPECT_FALSE(entry.found_at_start(setup));
+  EXPECT_FALSE(MakeEffects("optical_stabilisation:logged", setup));
+  std::vector<LensSample> samples;  // 30 px/s to the right and 12 px/s up, zero at 4 s
+  for (int i = 0; i <= 100; ++i) {
+    samples.push_back({100'000'000LL * i, Eigen::Vector2d(30.0, -12.0) * (0.1 * i - 4.0)});
+  }
+  setup.lens_shift = std::make_shared<LensShift>(samples, 0);
+  setup.lens_is_held = true;  // of the start, which took the log's shift out
+  setup.readout_s = 0.02;     // the pixel is in the middle row
+  EXPECT_TRUE(entry.found_at_start(setup));
+  EXPECT_THAT(entry.shapes(setup), ElementsAre("logged"));
+  const auto expect_at = [&](const std::string& shape, double time_s) {
+    const Eigen::Vector2d is = Eigen::Vector2d(30.0, -12.0) * (time_s - 4.0);
+    Eigen::Matrix<double, 2, 4> expected;
+    expected << is, Eigen::Vector2d(30.0, -12.0), Eigen::Vector2d(-is.y(), is.x()),
+        Eigen::Vector2d(is.x(), -is.y());
+    EXPECT_LT((ShiftsOf(shape, setup) - expected).norm(), 1e-6) << shape;
+  };
+  expect_at("logged", 5.01);
+  expect_at("logged/0.003", 5.013);
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(4);
+  const std::shared_ptr<const Effect> effect = entry.make(setup, "logged");
+  effect->SetStart(start.data());
+  EXPECT_EQ(start, Eigen::VectorXd::Unit(4, 0));
+  EXPECT_FALSE(effect->hides_turns());
+  EXPECT_TRUE(entry.make(setup, "0.5")->hides_turns());
+}
+
+TEST(OpticalStabilisation, AFitSaysHowLateTheLogIs) {
+  const EffectEntry& entry = *FindEffect("optical_stabilisation");
+  std::vector<double> values = {0.5, 0.001, 0.1, 0.2};  // half of it, by 1 ms px
+  EXPECT_EQ(entry.shape_by_fit("logged", values.data()), "logged/0.002");
+  EXPECT_THAT(values, ElementsAre(0.5, 0.0, 0.1, 0.2));
+  values[1] = -0.001;
+  EXPECT_EQ(entry.shape_by_fit("logged/0.002", values.data()), "logged");
+  values = {0.01, 0.001, 0.0, 0.0};  // a lens that is not there has no time
+  EXPECT_EQ(entry.shape_by_fit("logged", values.data()), "logged");
+}
+
 TEST(OpticalStabilisation, RefusesWhatIsNoShape) {
-  for (const std::string shape : {"x", "0", "-1", "0.5/", "0.5/0", "0.5/0.02x", "0.5x"}) {
+  for (const std::string shape : {"x", "0", "-1", "0.5/", "0.5/0", "0.5/0.02x", "0.5x", "logged",
+                                  "logged/", "logged/x", "logged/1"}) {
     EXPECT_FALSE(MakeEffects("optical_stabilisation:" + shape, Circling(0.06))) << shape;
   }
 }

@@ -66,6 +66,31 @@ TEST_F(VideoImuCapture, IsRead) {
   EXPECT_DOUBLE_EQ(*recording->camera.readout_s, 0.02);
 }
 
+// Android counts in pixels of the sensor, here four of the picture's.
+TEST_F(VideoImuCapture, SaysWhereTheLensWas) {
+  const auto pictures = [](float x) {
+    return Imu(1000000000, {0.25f, 0.5f, 0.75f}) + Imu(1005000000, {-0.25f, 0.5f, 0.75f}) +
+           Picture(1000000000, 0, LensPosition(1002000000, 4.0f, 8.0f)) +
+           Picture(1040000000, 1, LensPosition(1041000000, x, 8.0f)) +
+           Picture(1080000000, 2, LensPosition(1081000000, 4.0f, 8.0f)) +
+           Picture(1120000000, 3, LensPosition(1121000000, 4.0f, 8.0f));
+  };
+  const std::string sensor = Bytes(2, Whole(3, 1) + Bytes(12, Whole(1, 256) + Whole(2, 192)));
+  const Result<Recording> recording = Read(sensor + pictures(-6.0f));
+  ASSERT_TRUE(recording) << recording.error().message;
+  ASSERT_EQ(recording->lens_shift.size(), 4u);
+  EXPECT_EQ(recording->lens_shift[1].stamp_ns, 1041000000);
+  EXPECT_EQ(recording->lens_shift[1].shift_px, Eigen::Vector2d(-1.5, 2.0));
+  EXPECT_THAT(recording->notes, Contains(HasSubstr("by up to 2.5 px")));
+  const Result<Recording> unknown = Read(camera_ + pictures(-6.0f));
+  ASSERT_TRUE(unknown) << unknown.error().message;
+  EXPECT_TRUE(unknown->lens_shift.empty());
+  EXPECT_THAT(unknown->notes, Contains(HasSubstr("has no width of the sensor")));
+  const Result<Recording> wild = Read(sensor + pictures(std::nanf("")));
+  ASSERT_FALSE(wild);
+  EXPECT_THAT(wild.error().message, HasSubstr("stamp 1041000000: a shift of nan px"));
+}
+
 TEST_F(VideoImuCapture, WhatIsNotWholeIsRefused) {
   const size_t last = good_.size() - Picture(1120000000, 3).size();
   const std::vector<std::pair<std::string, std::string>> cases = {

@@ -36,9 +36,13 @@ inline std::string Imu(uint64_t time_ns, const std::vector<float>& gyro) {
   return Bytes(4, Whole(1, time_ns) + Floats(2, gyro) + Floats(3, {9, 9, 9}) +
                       Floats(4, {0, 0.5f, 9.75f}) + Whole(6, 3));
 }
-inline std::string Picture(uint64_t time_ns, uint64_t number) {
+// more: further fields.
+inline std::string Picture(uint64_t time_ns, uint64_t number, const std::string& more = "") {
   return Bytes(5, Whole(1, time_ns) + Whole(2, number) + Whole(3, 5000000) + Whole(5, 20000000) +
-                      Float(8, 512.5f));
+                      Float(8, 512.5f) + more);
+}
+inline std::string LensPosition(uint64_t time_ns, float x, float y) {
+  return Bytes(10, Whole(1, time_ns) + Float(2, x) + Float(3, y));
 }
 
 }  // namespace camgyro::video_meta
