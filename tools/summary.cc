@@ -32,7 +32,7 @@ std::string EffectRows(const Calibration& c) {
   std::string rows;
   if (!c.effects) return rows;
   for (const EffectSet::Item& item : c.effects->items()) {
-    rows += "  " + item.entry->name + (item.entry->shape_by_fit ? " (" + item.shape + ")" : "") +
+    rows += "  " + NameWithShape(item) +
             (item.effect->size() == 0 ? " (no number of its own)" : "") + "\n";
     for (int k = 0; k < item.effect->size(); ++k) {
       if (k == 4 && item.effect->size() > 5) {

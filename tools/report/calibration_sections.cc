@@ -122,14 +122,14 @@ std::string EffectsTable(const Calibration& c) {
   table.header = {"effect", "parameter", "value", "± sigma", "unit"};
   for (size_t i = 0; i < c.effects->items().size(); ++i) {
     const EffectSet::Item& item = c.effects->items()[i];
-    if (item.effect->size() == 0) table.rows.push_back({{item.entry->name, "", 0.0}});
+    if (item.effect->size() == 0) table.rows.push_back({{NameWithShape(item), "", 0.0}});
     for (int k = 0; k < item.effect->size(); ++k) {
       const EffectParameter& p = item.effect->parameters()[static_cast<size_t>(k)];
       const ReadableUnit unit = ReadableUnitOf(p.unit);
       const double value = c.effect_values[item.first + k];
       const double sigma = std::sqrt(c.effect_covariance(item.first + k, item.first + k));
       const std::string key = Format("effects.%zu.parameters.%d.", i, k);
-      table.rows.push_back({{k == 0 ? item.entry->name : "", "", 0.0},
+      table.rows.push_back({{k == 0 ? NameWithShape(item) : "", "", 0.0},
                             {p.name, "", 0.0},
                             {Format("%.4g", unit.scale * value), key + "value", value},
                             {Format("%.2g", unit.scale * sigma), key + "sigma", sigma},

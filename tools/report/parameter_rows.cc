@@ -41,6 +41,10 @@ ReadableUnit ReadableUnitOf(const std::string& unit) {
   return {1.0, unit};
 }
 
+std::string NameWithShape(const EffectSet::Item& item) {
+  return item.entry->name + (item.entry->shape_by_fit ? " (" + item.shape + ")" : "");
+}
+
 int DecimalsFor(double sigma) {
   if (!(sigma > 0.0)) return 6;
   return std::min(6, std::max(0, 1 - static_cast<int>(std::floor(std::log10(sigma)))));

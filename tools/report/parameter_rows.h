@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/calibration.h"
+#include "core/effects/catalogue.h"
 
 namespace camgyro {
 
@@ -37,6 +38,9 @@ struct ReadableUnit {
   std::string name;
 };
 ReadableUnit ReadableUnitOf(const std::string& unit);
+
+// An effect of a fit as people know it, with its shape where the shape has numbers that were found.
+std::string NameWithShape(const EffectSet::Item& item);
 
 // Digits after the point that show two digits of the sigma, 0..6.
 int DecimalsFor(double sigma);

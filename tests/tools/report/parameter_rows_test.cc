@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <vector>
+
 namespace camgyro {
 namespace {
 
@@ -21,6 +24,17 @@ TEST(ParameterRows, TwoDigitsOfTheSigmaAreShown) {
   EXPECT_EQ(DecimalsFor(1.7), 1);
   EXPECT_EQ(DecimalsFor(0.039), 3);
   EXPECT_EQ(DecimalsFor(1e-12), 6);
+}
+
+// A shape is what a fit has found only where it has numbers that a fit tells better.
+TEST(ParameterRows, AnEffectHasTheShapeThatWasFound) {
+  EffectSet set;
+  set.Add(FindEffect("optical_stabilisation"), "0.61/0.025",
+          std::make_shared<Effect>(std::vector<EffectParameter>()));
+  set.Add(FindEffect("radial_distortion"), "radtan",
+          std::make_shared<Effect>(std::vector<EffectParameter>()));
+  EXPECT_EQ(NameWithShape(set.items()[0]), "optical_stabilisation (0.61/0.025)");
+  EXPECT_EQ(NameWithShape(set.items()[1]), "radial_distortion");
 }
 
 }  // namespace
