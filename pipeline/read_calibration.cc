@@ -236,24 +236,31 @@ std::string NameOfEffect(const YAML::Node& effect) {
   return name.Scalar();
 }
 
+std::vector<ListedEffect> ParseEffects(const YAML::Node& root) {
+  std::vector<ListedEffect> listed;
+  const YAML::Node effects = root.IsMap() ? root["effects"] : YAML::Node();
+  for (const YAML::Node& effect : effects) {
+    ListedEffect& one = listed.emplace_back();
+    one.name = NameOfEffect(effect);
+    if (!effect.IsMap()) continue;
+    if (const YAML::Node shape = effect["shape"]; shape && shape.IsScalar()) {
+      one.shape = shape.Scalar();
+    }
+    for (const YAML::Node& parameter : effect["parameters"]) {
+      one.values.push_back(Section("effects", parameter).Number("value", 0.0));
+    }
+  }
+  return listed;
+}
+
 // Of the effect that reads columns.
 double ParseColumnReadout(const YAML::Node& root) {
   double sum_s = 0.0;
-  const YAML::Node effects = root.IsMap() ? root["effects"] : YAML::Node();
-  for (const YAML::Node& effect : effects) {
-    if (NameOfEffect(effect) != kColumns || !effect.IsMap()) continue;
-    for (const YAML::Node& parameter : effect["parameters"]) {
-      sum_s += Section("effects", parameter).Number("value", 0.0);
-    }
+  for (const ListedEffect& effect : ParseEffects(root)) {
+    if (effect.name != kColumns) continue;
+    for (const double value : effect.values) sum_s += value;
   }
   return sum_s;
-}
-
-std::vector<std::string> ParseEffectNames(const YAML::Node& root) {
-  std::vector<std::string> names;
-  const YAML::Node effects = root.IsMap() ? root["effects"] : YAML::Node();
-  for (const YAML::Node& effect : effects) names.push_back(NameOfEffect(effect));
-  return names;
 }
 
 // The state's numbers under a key that has to be there.
@@ -283,11 +290,12 @@ CalibrationReport ParseReport(const YAML::Node& root) {
   CalibrationReport report;
   Calibration& c = report.calibration;
   c = Parse(root);
-  for (const std::string& name : ParseEffectNames(root)) {
+  for (const ListedEffect& effect : ParseEffects(root)) {
     // Of columns the file's covariance holds all that the parameters have to do with them.
-    if (!IsEffectOfDevice(name) || name == kColumns) continue;
-    throw Complaint{root["effects"].Mark(),
-                    "effects: " + name + ": expected a calibration without it, to be combined"};
+    if (!IsEffectOfDevice(effect.name) || effect.name == kColumns) continue;
+    throw Complaint{
+        root["effects"].Mark(),
+        "effects: " + effect.name + ": expected a calibration without it, to be combined"};
   }
   const Section prior(root, "prior");
   report.prior.mean = Moved(c, StateNumbers(prior, "offset"));
@@ -345,8 +353,8 @@ Result<Calibration> ReadCalibrationOfRows(const std::string& path) {
   return calibration;
 }
 
-Result<std::vector<std::string>> ReadEffectNames(const std::string& path) {
-  return ParseFile(path, ParseEffectNames);
+Result<std::vector<ListedEffect>> ReadEffects(const std::string& path) {
+  return ParseFile(path, ParseEffects);
 }
 
 }  // namespace camgyro

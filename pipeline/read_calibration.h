@@ -32,8 +32,14 @@ Result<CalibrationReport> ReadCalibrationReport(const std::string& path);
 // (ReadsColumns).
 Result<Calibration> ReadCalibrationOfRows(const std::string& path);
 
-// Names of the effects that the file lists. Errors as above.
-Result<std::vector<std::string>> ReadEffectNames(const std::string& path);
+// An effect that the file lists: in which shape, and the values of its parameters.
+struct ListedEffect {
+  std::string name, shape;
+  std::vector<double> values;
+};
+
+// Those of the file; one that is listed by its name alone has the rest empty. Errors as above.
+Result<std::vector<ListedEffect>> ReadEffects(const std::string& path);
 
 }  // namespace camgyro
 

@@ -32,7 +32,7 @@ std::string Join(const std::vector<std::string>& words) {
 }
 
 // What the files do not say, or say without grounds.
-std::vector<std::string> Caveats(const ExportInput& input, const std::vector<std::string>& effects,
+std::vector<std::string> Caveats(const ExportInput& input, const std::vector<ListedEffect>& effects,
                                  const ExportFormat& format) {
   std::vector<std::string> notes;
   std::vector<std::string> undetermined;
@@ -45,10 +45,9 @@ std::vector<std::string> Caveats(const ExportInput& input, const std::vector<std
   }
   // Those of the lens stand in the file's `camera` section, and so in the exports.
   std::vector<std::string> lost;
-  for (const std::string& effect : effects) {
-    if (effect != "radial_distortion" && effect != "tangential_distortion" &&
-        effect != "aspect_ratio") {
-      lost.push_back(effect);
+  for (const auto& [name, shape, values] : effects) {
+    if (name != "radial_distortion" && name != "tangential_distortion" && name != "aspect_ratio") {
+      lost.push_back(name);
     }
   }
   if (!lost.empty()) notes.push_back("effects that this format does not hold: " + Join(lost));
@@ -67,7 +66,7 @@ Status RunExport(const std::vector<std::string>& arguments) {
 
   const Result<Calibration> calibration = ReadCalibration(arguments[0]);
   if (!calibration) return tl::unexpected(calibration.error());
-  const Result<std::vector<std::string>> effects = ReadEffectNames(arguments[0]);
+  const Result<std::vector<ListedEffect>> effects = ReadEffects(arguments[0]);
   if (!effects) return tl::unexpected(effects.error());
   Recording of_densities;
   ExportInput input;

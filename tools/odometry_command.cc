@@ -12,6 +12,7 @@
 #include "estimator/odometry/gyro_rate_trajectory.h"
 #include "pipeline/find_loops.h"
 #include "pipeline/frame_times_file.h"
+#include "pipeline/moving_lens.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/result_files.h"
 #include "pipeline/run.h"
@@ -80,6 +81,9 @@ Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
   if (!FLAGS_calibration.empty()) {
     Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
     if (!calibration) return calibration;
+    if (Status still = RefuseStabilisedLens(FLAGS_calibration); !still) {
+      return tl::unexpected(still.error());
+    }
     if (Status read = ApplyFrameTimes(FLAGS_calibration, recording); !read) {
       return tl::unexpected(read.error());
     }
@@ -96,6 +100,9 @@ Result<Calibration> CalibrationOf(Recording* recording, ProgressBar* bar) {
   const Calibration& fit = run->report.calibration;
   if (ReadsColumns(fit.readout_s, ColumnReadoutOf(fit))) {
     return BadInput(std::string("calibration: ") + kReadsColumns);
+  }
+  if (const Status still = RefuseStabilisedLens(fit); !still) {
+    return tl::unexpected(still.error());
   }
   ApplyFrameTimes(run->report.frame_times, recording);
   return run->report.calibration;

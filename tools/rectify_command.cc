@@ -11,6 +11,7 @@
 #include "core/recording_csv.h"
 #include "frontend/readers/read_recording.h"
 #include "pipeline/frame_times_file.h"
+#include "pipeline/moving_lens.h"
 #include "pipeline/read_calibration.h"
 #include "pipeline/result_files.h"
 #include "tools/commands.h"
@@ -122,13 +123,16 @@ Status RunRectify(const std::vector<std::string>& arguments) {
   }
   NewFolder folder(FLAGS_out);
   if (Status made = folder.Make(); !made) return made;
-  const Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
+  Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
   if (!calibration) return tl::unexpected(calibration.error());
   const Result<ReadOptions> reading = ReadOptionsFromFlags();
   if (!reading) return tl::unexpected(reading.error());
   Result<Recording> recording = ReadRecording(arguments[0], *reading);
   if (!recording) return tl::unexpected(recording.error());
   if (const Status read = ApplyFrameTimes(FLAGS_calibration, &*recording); !read) return read;
+  if (const Status lens = AddMovingLens(FLAGS_calibration, *recording, &*calibration); !lens) {
+    return lens;
+  }
   RectifyOptions options;
   options.undistort = FLAGS_undistort;
   options.remove_bias = FLAGS_remove_bias;

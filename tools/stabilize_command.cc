@@ -9,6 +9,7 @@
 #include "core/format.h"
 #include "frontend/readers/read_recording.h"
 #include "pipeline/frame_times_file.h"
+#include "pipeline/moving_lens.h"
 #include "pipeline/read_calibration.h"
 #include "tools/commands.h"
 #include "tools/progress_bar.h"
@@ -102,13 +103,16 @@ Status RunStabilize(const std::vector<std::string>& arguments) {
   if (extension != ".mp4" && extension != ".mov" && extension != ".mkv") {
     return BadUsage("stabilize: --out: expected the name of a video, .mp4, .mov or .mkv");
   }
-  const Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
+  Result<Calibration> calibration = ReadCalibrationOfRows(FLAGS_calibration);
   if (!calibration) return tl::unexpected(calibration.error());
   const Result<ReadOptions> reading = ReadOptionsFromFlags();
   if (!reading) return tl::unexpected(reading.error());
   Result<Recording> recording = ReadRecording(arguments[0], *reading);
   if (!recording) return tl::unexpected(recording.error());
   if (const Status read = ApplyFrameTimes(FLAGS_calibration, &*recording); !read) return read;
+  if (const Status lens = AddMovingLens(FLAGS_calibration, *recording, &*calibration); !lens) {
+    return lens;
+  }
   std::error_code error;
   if (fs::exists(out, error) && !recording->video_file.empty() &&
       fs::equivalent(out, recording->video_file, error)) {

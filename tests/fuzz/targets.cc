@@ -41,7 +41,7 @@ Status ReadAll(const std::string& path) {
 }
 
 Status ReadCalibrationFile(const std::string& path) {
-  const Result<std::vector<std::string>> effects = ReadEffectNames(path);
+  const Result<std::vector<ListedEffect>> effects = ReadEffects(path);
   if (!effects) return tl::unexpected(effects.error());
   const Result<Calibration> calibration = ReadCalibration(path);
   if (!calibration) return tl::unexpected(calibration.error());

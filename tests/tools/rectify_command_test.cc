@@ -87,11 +87,19 @@ TEST_F(RectifyCommandTest, RefusesWithoutLeavingAnything) {
   expect("a --calibration=a/truth.yaml --out=a", 2, "expected a new or empty folder");
   expect("a --calibration=none.yaml --out=b", 3, "none.yaml");
   expect("nowhere --calibration=a/truth.yaml --out=b", 3, "nowhere");
-  std::string yaml = ReadFile(Path("a/truth.yaml"));
-  std::ofstream(Path("columns.yaml")) << yaml.replace(
-      yaml.find("effects: []"), 11,
-      "effects: [{name: readout_direction, parameters: [{value: -0.03, sigma: 0.001}]}]");
+  const auto with_effect = [&](const std::string& effect) {
+    std::string yaml = ReadFile(Path("a/truth.yaml"));
+    return yaml.replace(yaml.find("effects: []"), 11, "effects: [{name: " + effect + "}]");
+  };
+  std::ofstream(Path("columns.yaml"))
+      << with_effect("readout_direction, parameters: [{value: -0.03, sigma: 0.001}]");
   expect("a --calibration=columns.yaml --out=b", 3, "columns.yaml: the pictures are read column");
+  // Where the lens was is not in this recording; odometry holds it still in any case.
+  std::ofstream(Path("lens.yaml")) << with_effect("optical_stabilisation, shape: logged");
+  expect("a --calibration=lens.yaml --out=b", 3, "lens.yaml: effects: optical_stabilisation: not");
+  const RunResult odometry = Run("odometry a --calibration=lens.yaml --out=b");
+  EXPECT_EQ(odometry.exit_code, 3);
+  EXPECT_THAT(odometry.err, HasSubstr("lens.yaml: the lens moves as the camera turns"));
 }
 
 }  // namespace

@@ -41,6 +41,23 @@ double CameraPath::RowTime(int frame, double row_px) const {
                       calibration_.height_px);
 }
 
+LensParameters CameraPath::LensChange(int frame, double row_px) const {
+  LensParameters change = LensParameters::Zero();
+  if (!calibration_.effects) return change;
+  const Eigen::Vector2d size_px(calibration_.width_px, calibration_.height_px);
+  const Observation seen = {
+      {0.5 * size_px.x(), row_px}, size_px, FrameTime(frame_times_s_[static_cast<size_t>(frame)])};
+  for (const EffectSet::Item& item : calibration_.effects->items()) {
+    const int n = item.effect->size();
+    if (item.effect->is_constant_lens()) continue;
+    Eigen::Matrix<double, kLensSize, Eigen::Dynamic> columns =
+        Eigen::Matrix<double, kLensSize, Eigen::Dynamic>::Zero(kLensSize, n);
+    item.effect->ChangeLens(seen, columns);
+    change += columns * calibration_.effect_values.segment(item.first, n);
+  }
+  return change;
+}
+
 Eigen::Matrix3d CameraPath::R_world_cam(double time_s) const {
   return chain_.At(time_s).R_ref_gyro * R_gyro_cam_;
 }

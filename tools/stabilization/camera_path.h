@@ -22,6 +22,9 @@ class CameraPath {
 
   // When a row of a frame was exposed, on the gyro's clock from its first sample [s].
   double RowTime(int frame, double row_px) const;
+  // By how much the lens differs from the calibration's while a row is exposed: by those of the
+  // calibration's effects that move it.
+  LensParameters LensChange(int frame, double row_px) const;
   Eigen::Matrix3d R_world_cam(double time_s) const;
   Eigen::Matrix3d R_world_cam(int frame, double row_px) const {
     return R_world_cam(RowTime(frame, row_px));

@@ -43,37 +43,40 @@ FrameWarp::FrameWarp(const CameraPath& path, const Calibration& calibration, int
   const Eigen::Matrix3d R_virtual_world = q_world_virtual.conjugate().toRotationMatrix();
   for (int i = 0; i < kRows; ++i) {
     const double row = calibration.height_px * (2.0 * i / (kRows - 1) - 0.5);
-    table_[static_cast<size_t>(i)] = R_virtual_world * path.R_world_cam(frame, row);
+    table_[static_cast<size_t>(i)] = {R_virtual_world * path.R_world_cam(frame, row),
+                                      calibration.lens + path.LensChange(frame, row)};
   }
 }
 
-Eigen::Matrix3d FrameWarp::R_virtual_cam(double row_px) const {
+FrameWarp::Row FrameWarp::At(double row_px) const {
   // Entries are some 1 ms apart: at 20 rad/s^2 and 2 rad/s a mean of two is 5e-6 off.
   const double place =
       std::clamp((row_px / calibration_.height_px + 0.5) * 0.5 * (kRows - 1), 0.0, kRows - 1.0);
   const size_t low = std::min(static_cast<size_t>(place), static_cast<size_t>(kRows - 2));
   const double weight = place - static_cast<double>(low);
-  return (1.0 - weight) * table_[low] + weight * table_[low + 1];
+  const Row &before = table_[low], &after = table_[low + 1];
+  return {(1.0 - weight) * before.R_virtual_cam + weight * after.R_virtual_cam,
+          (1.0 - weight) * before.lens + weight * after.lens};
 }
 
 std::optional<Eigen::Vector2d> FrameWarp::ToVirtual(const Eigen::Vector2d& px) const {
   RayJet jet;
-  if (!lens_.Unproject(px, calibration_.lens, &jet, LensDerivatives::kNone)) {
-    return std::nullopt;
-  }
-  return camera_.Project(R_virtual_cam(px.y()) * jet.ray);
+  const Row row = At(px.y());
+  if (!lens_.Unproject(px, row.lens, &jet, LensDerivatives::kNone)) return std::nullopt;
+  return camera_.Project(row.R_virtual_cam * jet.ray);
 }
 
 std::optional<Eigen::Vector2d> FrameWarp::ToSource(const Eigen::Vector2d& px_virtual) const {
   const std::optional<Eigen::Vector3d> ray = camera_.Ray(px_virtual);
   if (!ray) return std::nullopt;
   // A row later is seen line_delay later, when the point has moved by far less than a row.
-  double row = std::clamp(px_virtual.y(), 0.0, static_cast<double>(calibration_.height_px));
+  double row_px = std::clamp(px_virtual.y(), 0.0, static_cast<double>(calibration_.height_px));
   std::optional<Eigen::Vector2d> px;
   for (int i = 0; i < 6; ++i) {
-    px = lens_.Project(R_virtual_cam(row).transpose() * *ray, calibration_.lens);
-    if (!px || std::abs(px->y() - row) < 0.02) break;
-    row = px->y();
+    const Row row = At(row_px);
+    px = lens_.Project(row.R_virtual_cam.transpose() * *ray, row.lens);
+    if (!px || std::abs(px->y() - row_px) < 0.02) break;
+    row_px = px->y();
   }
   return px;
 }

@@ -48,12 +48,17 @@ class FrameWarp {
 
  private:
   static constexpr int kRows = 33;  // of the table, from half a height above to half below
-  Eigen::Matrix3d R_virtual_cam(double row_px) const;
+  struct Row {
+    Eigen::Matrix3d R_virtual_cam;
+    LensParameters lens;
+  };
+  // Of any row, between those of the table.
+  Row At(double row_px) const;
 
   const Calibration& calibration_;
   const Lens& lens_;
   VirtualCamera camera_;
-  std::array<Eigen::Matrix3d, kRows> table_;
+  std::array<Row, kRows> table_;
 };
 
 }  // namespace camgyro

@@ -27,6 +27,7 @@ FrameWarp WarpOf(const CameraPath& path, const Calibration& recorded, int frame,
 // What a calibration of the rectified recording would find.
 Calibration RectifiedCalibration(Calibration c, const RectifyOptions& options) {
   c.delay_s = c.readout_s = 0.0;
+  c.effects.reset();
   if (options.remove_bias) c.bias_gyro_rad_s.setZero();
   if (options.undistort) {
     c.distortion_model = DistortionModel::kNone;

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <memory>
 
+#include "core/effects/catalogue.h"
 #include "core/time.h"
 #include "simulation/simulate.h"
 #include "tools/stabilization/registration.h"
@@ -64,6 +66,35 @@ TEST(Rectify, FramesAreAsOfAGlobalShutterOnTheGyrosClock) {
   without.readout_s = 0.0;
   Recording recorded = s.recording;
   EXPECT_GT(Turned(*Rectify(without, {}, &recorded)), 0.5);
+}
+
+// A stabilised lens makes up for nine tenths of the turns: after rectification it has not moved.
+TEST(Rectify, TakesOutWhatALensDidWhileItWasRead) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 3.0;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRotation);
+  scenario.motion.speed_m_s = scenario.motion.sway_rms_m_s = 0.0;
+  scenario.tracks.noise_px = 0.0;
+  scenario.gyro.noise_density_rad_s_rtHz = scenario.gyro.bias_walk_rad_s2_rtHz = 0.0;
+  scenario.effects.optical_stabilisation = {0.9, 0.5};
+  scenario.effects.optical_stabilisation.log_hz = 500.0;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  EffectSetup setup;
+  setup.size_px << s.truth.width_px, s.truth.height_px;
+  setup.readout_s = s.truth.readout_s;
+  setup.lens_shift =
+      std::make_shared<LensShift>(s.recording.lens_shift, s.recording.gyro.front().stamp_ns);
+  Calibration with = s.truth;
+  with.effects =
+      std::make_shared<const EffectSet>(MakeEffects("optical_stabilisation:logged", setup).value());
+  with.effect_values = Eigen::VectorXd::Unit(4, 0);
+  Recording recorded = s.recording;
+  const auto rectified = Rectify(with, {}, &recorded);
+  ASSERT_TRUE(rectified) << rectified.error().message;
+  EXPECT_LT(Turned(*rectified), 0.02);
+  EXPECT_EQ(rectified->calibration.effects, nullptr);
+  recorded = s.recording;
+  EXPECT_GT(Turned(*Rectify(s.truth, {}, &recorded)), 1.0);
 }
 
 TEST(Rectify, DropsWhatLeavesThePictureOrTheGyrosTime) {
