@@ -46,8 +46,6 @@ EstimationInput PartOf(const EstimationInput& input, size_t first, size_t end,
 std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Calibration& fit,
                                           const std::vector<FrameOffset>& of_pairs, double noise_px,
                                           const PairGraphOptions& graph) {
-  // Of the calibration's sigmas: what is a frame's own moves nothing else.
-  constexpr double kHeld = 1e-3;
   // The calibration and the times of the frames in pairs are known; what is left are directions and
   // times.
   constexpr int kRounds = 3;
@@ -63,11 +61,12 @@ std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Cali
   RefinementOptions with;
   with.graph = graph;
   with.max_rounds = kRounds;
-  with.frame_times_alone = true;
+  with.frame_times_alone = with.graph.hold_shared = true;
   with.latents = std::move(times);
   with.graph.sigma = noise_px;
-  const Prior held = {fit, kHeld * fit.sigma(),
-                      kHeld * fit.effect_covariance.diagonal().cwiseMax(1e-24).cwiseSqrt()};
+  // What is a frame's own moves nothing else.
+  const Prior held = {fit, fit.sigma(),
+                      fit.effect_covariance.diagonal().cwiseMax(1e-24).cwiseSqrt()};
 
   std::vector<std::vector<FrameOffset>> of_stretches((input.pairs.size() + kStretch - 1) /
                                                      kStretch);

@@ -2,11 +2,17 @@
 
 #include <glog/logging.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "factors/robust.h"
 
 namespace camgyro {
+namespace {
+
+bool IsWanted(const double* jacobian) { return jacobian != nullptr; }
+
+}  // namespace
 
 PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matrix<double, 3, 2>& A,
                                     const Eigen::Vector3d& b, const Eigen::Matrix<double, 3, 2>& B,
@@ -59,6 +65,13 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
                                  pair.own_times ? parameters + times_block : nullptr);
   const Eigen::Vector3d tau = Eigen::Map<const Eigen::Vector3d>(parameters[kTauBlock]);
   const Eigen::Map<const Eigen::Matrix<double, 3, 2>> bend(parameters[kBendBlock]);
+  // What is held, nobody asks about: directions and the frames' own times need none of it.
+  const bool whole_row =
+      jacobians != nullptr &&
+      (std::any_of(jacobians, jacobians + kTauBlock, IsWanted) ||
+       std::any_of(jacobians + kEffectsBlock, jacobians + times_block, IsWanted) ||
+       std::any_of(jacobians + first_rate_group, jacobians + parameter_block_sizes().size(),
+                   IsWanted));
   PairRow row(chain);
   Bearing a, b;
   for (size_t i = 0; i < pair.matches.size(); ++i) {
@@ -70,11 +83,13 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
     const RobustResidual robust = Robustify(r.value, pair.robust_threshold);
     residuals[i] = robust.value;
     if (jacobians == nullptr) continue;
-    row.Clear();
-    row.Add(a, chain, pair.size_px.y(), r.by_a, r.by_J_a);
-    row.Add(b, chain, pair.size_px.y(), r.by_b, r.by_J_b);
-    row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair, first_rate_group,
-              jacobians);
+    if (whole_row) {
+      row.Clear();
+      row.Add(a, chain, pair.size_px.y(), r.by_a, r.by_J_a);
+      row.Add(b, chain, pair.size_px.y(), r.by_b, r.by_J_b);
+      row.Write(static_cast<int>(i), robust.derivative, parameters[2], pair, first_rate_group,
+                jacobians);
+    }
     for (int k = 0; k < NumTimeBlocks(pair); ++k) {
       if (jacobians[times_block + k] == nullptr) continue;
       jacobians[times_block + k][i] =

@@ -117,7 +117,7 @@ void FactorGraph::AddToProblem(const BlockId& id, Block* block) {
   const auto size = static_cast<int>(block->value.size());
   // Not AddParameterBlock with a manifold, see spare_directions_.
   problem_->AddParameterBlock(values, size);
-  if (block->tangent_size() == 0) {
+  if (block->held || block->tangent_size() == 0) {
     problem_->SetParameterBlockConstant(values);
   } else if (!block->constant.empty()) {
     CHECK(block->geometry == Geometry::kEuclidean);

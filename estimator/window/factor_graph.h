@@ -62,6 +62,7 @@ struct Block {
   Geometry geometry = Geometry::kEuclidean;
   Eigen::VectorXd value;
   std::vector<int> constant;  // coordinates that keep their value; Euclidean blocks only
+  bool held = false;          // in solves the whole block keeps its value
 
   int tangent_size() const {
     if (geometry == Geometry::kRotation) return 3;

@@ -40,6 +40,9 @@ class KeptCost final : public ceres::CostFunction {
   // Evaluates the other cost function now, if Evaluate would have to. Returns what that would.
   bool Prepare(double const* const* parameters) const;
 
+  // The other one.
+  const ceres::CostFunction& cost() const { return *cost_; }
+
   // What the function depends on besides its parameters has changed.
   void Forget() { known_ = false; }
 

@@ -43,11 +43,12 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
       rates_(options, prior, start.bias_gyro_rad_s, effects_),
       turn_sigma_rad_s_(options.turn_sigma_rad_s) {
   prior_mean_.effects = start.effects;
-  Block lens{Geometry::kEuclidean, start.lens, {}};
+  const bool held = options.hold_shared;
+  Block lens{Geometry::kEuclidean, start.lens, {}, held};
   for (int k = kAspect; k < kLensSize; ++k) lens.constant.push_back(k);
   graph_.AddBlock(kLensBlock, std::move(lens));
-  graph_.AddBlock(kShutterBlock, {Geometry::kEuclidean, ShutterOf(start), {}});
-  graph_.AddBlock(kRotationBlock, {Geometry::kRotation, start.q_gyro_cam.coeffs(), {}});
+  graph_.AddBlock(kShutterBlock, {Geometry::kEuclidean, ShutterOf(start), {}, held});
+  graph_.AddBlock(kRotationBlock, {Geometry::kRotation, start.q_gyro_cam.coeffs(), {}, held});
   AddStatePrior(prior);
   if (start.effects) {
     turn_sigma_rad_s_ =
@@ -57,7 +58,7 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
   CHECK_EQ(start.effect_values.size(), effects_->size());
   CHECK(effect_prior_sigma_.size() == 0 ||
         (effect_prior_sigma_.size() == effects_->size() && prior.mean.effects == start.effects));
-  graph_.AddBlock(kEffectsBlock, {Geometry::kEuclidean, start.effect_values, {}});
+  graph_.AddBlock(kEffectsBlock, {Geometry::kEuclidean, start.effect_values, {}, held});
   if (const int column = effects_->frame_time_spread();
       column >= 0 && residual().facts().with_frame_times) {
     double& spread_s = graph_.value(kEffectsBlock)[column];

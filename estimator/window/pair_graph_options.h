@@ -27,6 +27,9 @@ struct PairGraphOptions {
   // Matches without a ray through the lens as the effects make it at the start are left out, for
   // good; else such a start has no solution. (Without effects, they always are.)
   bool drop_without_ray = false;
+  // Lens, shutter, mounting, effects, biases and rates are known: solves move what pairs and frames
+  // have of their own.
+  bool hold_shared = false;
   // Each pair keeps its linearisation while its residuals change by less than this, root mean
   // square (KeptCost): for few pairs that are solved again and again. 0: while nothing changes.
   // Negative: not at all. A refinement chooses by itself.

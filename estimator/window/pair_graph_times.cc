@@ -10,6 +10,7 @@
 
 #include "core/parallel.h"
 #include "core/robust_statistics.h"
+#include "estimator/window/kept_cost.h"
 #include "estimator/window/pair_blocks.h"
 #include "estimator/window/pair_graph.h"
 #include "factors/frame_time_prior.h"
@@ -30,33 +31,12 @@ class LocalEquations {
     H_.setZero(size_, size_);
     g_.setZero(size_);
   }
-  void Add(const FactorGraph& graph, const Factor& factor) {
-    std::vector<const double*> values;
-    std::vector<RowMajor> jacobians;
-    std::vector<double*> pointers;
-    const int rows = factor.cost->num_residuals();
-    jacobians.reserve(factor.blocks.size());
-    for (const BlockId& id : factor.blocks) {
-      values.push_back(graph.value(id).data());
-      const bool wanted = columns_.count(id) > 0;
-      jacobians.emplace_back(wanted ? rows : 0, graph.value(id).size());
-      pointers.push_back(wanted ? jacobians.back().data() : nullptr);
-    }
-    Eigen::VectorXd r(rows);
-    if (!factor.cost->Evaluate(values.data(), r.data(), pointers.data())) return;
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, size_);
-    for (size_t i = 0; i < factor.blocks.size(); ++i) {
-      if (pointers[i] == nullptr) continue;
-      const Block& block = graph.block(factor.blocks[i]);
-      const int at = columns_.at(factor.blocks[i]);
-      if (block.geometry == Geometry::kDirection) {
-        J.middleCols<2>(at) = jacobians[i] * TangentsOf(block.value);
-      } else {
-        J.middleCols(at, block.tangent_size()) = jacobians[i];
-      }
-    }
-    H_.noalias() += J.transpose() * J;
-    g_.noalias() += J.transpose() * r;
+  void Add(const FactorGraph& graph, const Factor& factor) { Add(graph, factor, *factor.cost); }
+  // Where nothing of it is kept anyway: the cost function behind a KeptCost is asked for these
+  // blocks alone.
+  void AddAfresh(const FactorGraph& graph, const Factor& factor) {
+    const auto* const kept = dynamic_cast<const KeptCost*>(factor.cost.get());
+    Add(graph, factor, kept != nullptr ? kept->cost() : *factor.cost);
   }
   // More information about one number of a block.
   void AddTo(const BlockId& id, double information, double score) {
@@ -80,6 +60,35 @@ class LocalEquations {
   const Eigen::VectorXd& g() const { return g_; }
 
  private:
+  void Add(const FactorGraph& graph, const Factor& factor, const ceres::CostFunction& cost) {
+    std::vector<const double*> values;
+    std::vector<RowMajor> jacobians;
+    std::vector<double*> pointers;
+    const int rows = cost.num_residuals();
+    jacobians.reserve(factor.blocks.size());
+    for (const BlockId& id : factor.blocks) {
+      values.push_back(graph.value(id).data());
+      const bool wanted = columns_.count(id) > 0;
+      jacobians.emplace_back(wanted ? rows : 0, graph.value(id).size());
+      pointers.push_back(wanted ? jacobians.back().data() : nullptr);
+    }
+    Eigen::VectorXd r(rows);
+    if (!cost.Evaluate(values.data(), r.data(), pointers.data())) return;
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, size_);
+    for (size_t i = 0; i < factor.blocks.size(); ++i) {
+      if (pointers[i] == nullptr) continue;
+      const Block& block = graph.block(factor.blocks[i]);
+      const int at = columns_.at(factor.blocks[i]);
+      if (block.geometry == Geometry::kDirection) {
+        J.middleCols<2>(at) = jacobians[i] * TangentsOf(block.value);
+      } else {
+        J.middleCols(at, block.tangent_size()) = jacobians[i];
+      }
+    }
+    H_.noalias() += J.transpose() * J;
+    g_.noalias() += J.transpose() * r;
+  }
+
   static Eigen::Matrix<double, 3, 2> TangentsOf(const Eigen::Vector3d& direction) {
     Eigen::Matrix<double, 3, 2> basis;
     basis.col(0) = direction.unitOrthogonal();
@@ -193,7 +202,7 @@ void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair, PairBearings* bearing
     const double information = std::pow(width * *frame_time_spread_s_, -2);
     for (int step = 0; step < kSteps; ++step) {
       equations.Begin();
-      equations.Add(graph_, graph_.factors().at(pair->factor));
+      equations.AddAfresh(graph_, graph_.factors().at(pair->factor));
       equations.Add(graph_, graph_.factors().at(pair->bend_prior));
       for (const int64_t frame : pair->frame_times) {
         const double offset_s = graph_.value(FrameTimeBlock(frame))[0];

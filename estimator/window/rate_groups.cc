@@ -229,7 +229,7 @@ void RateGroups::AddTo(const Cover& cover, FactorGraph* graph) {
   CHECK_EQ(cover.groups.back(), next_group_);
   const int64_t id = next_group_++;
   AddBias(cover.group.bias_index, graph);
-  graph->AddBlock(RatesBlock(id), {Geometry::kEuclidean, cover.values, {}});
+  graph->AddBlock(RatesBlock(id), {Geometry::kEuclidean, cover.values, {}, options_.hold_shared});
   std::vector<BlockId> blocks = {RatesBlock(id), BiasBlock(cover.group.bias_index)};
   if (cover.reading_has_effects) blocks.push_back(kEffectsBlock);
   Group& group = groups_.emplace(id, cover.group).first->second;
@@ -253,7 +253,8 @@ Eigen::Vector3d RateGroups::BiasAt(int64_t index, const FactorGraph& graph) cons
 void RateGroups::AddBias(int64_t index, FactorGraph* graph) const {
   if (graph->Has(BiasBlock(index))) return;
   const BlockId before = BiasBefore(index, *graph);
-  graph->AddBlock(BiasBlock(index), {Geometry::kEuclidean, BiasAt(index, *graph), {}});
+  graph->AddBlock(BiasBlock(index),
+                  {Geometry::kEuclidean, BiasAt(index, *graph), {}, options_.hold_shared});
   if (before.kind == BlockKind::kBias) {
     graph->AddFactor(std::make_shared<BiasWalk>(
                          options_.bias_walk_rad_s2_rtHz,

@@ -155,8 +155,10 @@ class Refinement {
         continue;
       }
       // Where the next round would start from is not worth a covariance; the end is.
-      const bool settled =
-          yardstick_ && yardstick_->Distance(before, result_.calibration) < options_.settled_round;
+      const bool settled = options_.frame_times_alone
+                               ? solved_finely_
+                               : yardstick_ && yardstick_->Distance(before, result_.calibration) <
+                                                   options_.settled_round;
       if (!settled && !last) continue;
       if (const Status judged = Judge(before, residuals); !judged) {
         return tl::unexpected(judged.error());
@@ -187,8 +189,10 @@ class Refinement {
     for (const TimedPair& pair : pairs_) factors[pair.id] = pair.noise_factor;
     for (size_t i = 0; i < ids_.size(); ++i) factors[ids_[i]] = noise_now_.factors[i];
     graph_options_.sigma = noise_now_.scale;
-    graph_options_.keep_within_sigmas =
-        KeptBytes(pairs_, graph_options_) <= options_.most_kept_bytes ? 0.0 : -1.0;
+    // Where little is asked for, derivatives by all the rest cost more than what is kept saves.
+    const bool keep = !graph_options_.hold_shared &&
+                      KeptBytes(pairs_, graph_options_) <= options_.most_kept_bytes;
+    graph_options_.keep_within_sigmas = keep ? 0.0 : -1.0;
     built_at_ = result_.calibration;
     graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_,
                                          result_.rounds == 1 ? options_.latents : nullptr);
@@ -272,11 +276,10 @@ class Refinement {
   // Before, what is a sigma may still change a lot: with a lens that is far off, for example.
   SolveReport Solve() {
     SolveOptions options{30, kRoughly};
-    if (scale_settled_ || result_.rounds == options_.max_rounds) {
-      options = {30, 1e-5, kCostTolerance};
-    }
+    solved_finely_ = scale_settled_ || result_.rounds == options_.max_rounds;
+    if (solved_finely_) options = {30, 1e-5, kCostTolerance};
     yardstick_.reset();
-    if (scale_settled_) {
+    if (scale_settled_ && !options_.frame_times_alone) {
       if (const auto covariance = graph_->NoiseCovariance()) yardstick_.emplace(*covariance);
     }
     Calibration last = graph_->Estimate();
@@ -312,6 +315,10 @@ class Refinement {
       result_.frame_wander = FindWander(times, graph_.get());
       result_.frame_times = OffsetsOf(times, result_.frame_wander);
     }
+    if (options_.frame_times_alone) {
+      result_.converged = true;
+      return {};
+    }
     if (const Status known = graph_->EstimateCovariance(options_.cluster_s, cross_fit.inflation(),
                                                         &result_.calibration);
         !known) {
@@ -346,7 +353,7 @@ class Refinement {
   std::vector<int64_t> ids_;
   Calibration built_at_;
   Noise noise_now_;
-  bool scale_settled_ = false;
+  bool scale_settled_ = false, solved_finely_ = false;
   std::optional<Yardstick> yardstick_;
   Refined result_;
 };

@@ -35,8 +35,8 @@ struct RefinementOptions {
   // error of all sigmas.
   double settled_scale = 0.03;
   double cluster_s = 2.0;  // stretches of the clustered covariance
-  // The calibration is held, and the frames' own times are what is asked for: it is they that have
-  // to settle in a round.
+  // What pairs share is held (graph.hold_shared), and the frames' own times are what is asked for:
+  // it is they that have to settle in a round, and there is no covariance of the calibration.
   bool frame_times_alone = false;
   // The pairs' factors are found; false: they stay as they are.
   bool find_noise_factors = true;

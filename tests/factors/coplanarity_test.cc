@@ -1,5 +1,9 @@
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <functional>
+#include <vector>
+
 #include "factors/coplanarity_determinant.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/robust.h"
@@ -217,6 +221,33 @@ TEST(CoplanarityPlane, JacobianByTheFramesOwnTimesMatchesDifferences) {
       for (Match& match : s.pair->matches) match.noise_factor_b = {0.8, 0.1, 1.2};
     }
     ExpectJacobiansMatchDifferences(CoplanarityPlane(s.pair), s.Parameters(), 1e-6);
+  }
+}
+
+// Solves that hold some blocks ask for the others alone, and get what they get with all of them.
+TEST(CoplanarityPlane, JacobianByOneBlockIsThatOfAll) {
+  PairScene s = MakePairScene(3);
+  Disturb(3, &s);
+  s.pair->own_times = true;
+  const CoplanarityPlane factor(s.pair);
+  const auto parameters = s.Parameters();
+  const std::vector<int32_t>& sizes = factor.parameter_block_sizes();
+  const auto by_blocks = [&](const std::function<bool(size_t)>& is_wanted) {
+    std::vector<std::vector<double>> storage;
+    std::vector<double*> jacobians;
+    for (const int size : sizes) {
+      storage.emplace_back(static_cast<size_t>(size * factor.num_residuals()), -1e9);
+    }
+    for (size_t i = 0; i < sizes.size(); ++i) {
+      jacobians.push_back(is_wanted(i) ? storage[i].data() : nullptr);
+    }
+    std::vector<double> residuals(s.pair->matches.size());
+    EXPECT_TRUE(factor.Evaluate(parameters.data(), residuals.data(), jacobians.data()));
+    return storage;
+  };
+  const auto all = by_blocks([](size_t) { return true; });
+  for (size_t one = 0; one < sizes.size(); ++one) {
+    EXPECT_EQ(by_blocks([one](size_t i) { return i == one; })[one], all[one]) << one;
   }
 }
 

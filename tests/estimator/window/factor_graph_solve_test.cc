@@ -203,6 +203,22 @@ TEST(FactorGraphSolve, FindsTheMinimumOfARefinement) {
   ExpectSolvedToTheMinimum(graph.graph(), 1e-8, 1e-3);
 }
 
+// Where what pairs share is known, their own directions are found beside it.
+TEST(FactorGraphSolve, HoldsWhatPairsShare) {
+  PairGraphOptions options;
+  options.sigma = 0.7;
+  options.hold_shared = true;
+  PairGraph graph = RefinedGraph(options);
+  const auto before = graph.graph().blocks();
+  const SolveReport report = graph.Solve({10, 1e-10});
+  ASSERT_TRUE(report.usable);
+  EXPECT_LT(report.final_cost, report.initial_cost);
+  for (const auto& [id, block] : graph.graph().blocks()) {
+    const bool own = id.kind == BlockKind::kDirection || id.kind == BlockKind::kBend;
+    EXPECT_EQ(block.value != before.at(id).value, own) << static_cast<int>(id.kind);
+  }
+}
+
 // Pairs that keep their linearisation while nothing changes are evaluated by any number of threads.
 TEST(FactorGraphSolve, TheSameBytesWhoeverEvaluates) {
   const int most_threads = MostThreads();
