@@ -35,7 +35,8 @@ Eigen::Matrix<T, 3, 3> Rodrigues(const Vec3<T>& w) {
 
 template <typename T>
 Vec2<T> Distort(const T* lens, const Vec2<T>& p) {
-  const T r2 = p.squaredNorm(), x = p.x(), y = p.y();
+  const T r2 = p.squaredNorm();
+  const T &x = p.x(), &y = p.y();
   const T radial = T(1) + lens[4] * r2 + lens[5] * r2 * r2;
   return {x * radial + T(2) * lens[6] * x * y + lens[7] * (r2 + T(2) * x * x),
           y * radial + lens[6] * (r2 + T(2) * y * y) + T(2) * lens[7] * x * y};
