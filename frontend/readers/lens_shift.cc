@@ -14,8 +14,8 @@
 namespace camgyro {
 namespace {
 
-// A lens is sampled some 250 times a second. Beyond this, nobody knows where it is: at 5 Hz, a
-// tenth of a hand's tremor is made of what happens in between.
+// A lens is sampled some 250 times a second. Beyond this, nobody knows where it is: it is a tenth
+// of a period of 5 Hz, at which hands tremble.
 constexpr double kNear_s = 0.02;
 constexpr double kMoves_px = 0.01;  // less is rounding of a lens that is held
 

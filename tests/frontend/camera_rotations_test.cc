@@ -20,6 +20,26 @@ Recording Pictures() {
   return recording;
 }
 
+// Of rotations between middle rows, against what the gyro says with the true calibration [rad].
+double RmsError(const std::vector<CameraRotation>& rotations, const simulation::Simulated& s) {
+  double sum = 0.0;
+  int count = 0;
+  for (const CameraRotation& rotation : rotations) {
+    const auto stamp_ns = [&](int frame) {
+      return s.recording.frames[static_cast<size_t>(frame)].stamp_ns;
+    };
+    const auto between = GyroRotation::Between(
+        s.recording.gyro, s.truth, stamp_ns(rotation.frame_a), stamp_ns(rotation.frame_b));
+    if (!between) continue;
+    const double angle_rad =
+        rotation.q_a_b.angularDistance(Eigen::Quaterniond(between->BetweenMiddleRows()));
+    sum += angle_rad * angle_rad;
+    ++count;
+  }
+  EXPECT_GT(count, 50);
+  return std::sqrt(sum / count);
+}
+
 // A motion that is followed from one focal length to the next is the one that a search there finds,
 // but for pairs whose motion has two minima that are about as good.
 TEST(CameraRotationsOf, FollowsWhatASearchFinds) {
@@ -104,17 +124,7 @@ TEST(CameraRotationsOf, AGyroUndoesTheRollingShutter) {
   const double focal_px = truth.lens[kFocal];
   const auto rms_of = [&](const std::vector<CameraRotation>& rotations) {
     EXPECT_GE(rotations.size(), pairs.size() - 5);
-    double sum = 0.0;
-    for (const CameraRotation& rotation : rotations) {
-      const auto between = GyroRotation::Between(s.recording.gyro, truth,
-                                                 s.recording.frames[rotation.frame_a].stamp_ns,
-                                                 s.recording.frames[rotation.frame_b].stamp_ns);
-      if (!between) continue;
-      const double angle =
-          rotation.q_a_b.angularDistance(Eigen::Quaterniond(between->BetweenMiddleRows()));
-      sum += angle * angle;
-    }
-    return std::sqrt(sum / static_cast<double>(rotations.size()));
+    return RmsError(rotations, s);
   };
   const double without = rms_of(CameraRotationsOf(s.recording, pairs, {{focal_px, {}}}).front());
   const double with = rms_of(CameraRotationsOf(s.recording, pairs, {{focal_px, rough}}).front());
@@ -136,20 +146,7 @@ TEST(CameraRotationsOf, PutsALoggedLensBack) {
                                s.truth.delay_s + 0.5 * s.truth.readout_s, 0.0, s.truth.readout_s};
     const std::vector<CameraRotation> rotations =
         CameraRotationsOf(recording, pairs, {{s.truth.lens[kFocal], rough}}).front();
-    double sum = 0.0;
-    int count = 0;
-    for (const CameraRotation& rotation : rotations) {
-      const auto between = GyroRotation::Between(s.recording.gyro, s.truth,
-                                                 s.recording.frames[rotation.frame_a].stamp_ns,
-                                                 s.recording.frames[rotation.frame_b].stamp_ns);
-      if (!between) continue;
-      const double angle_rad =
-          rotation.q_a_b.angularDistance(Eigen::Quaterniond(between->BetweenMiddleRows()));
-      sum += angle_rad * angle_rad;
-      ++count;
-    }
-    EXPECT_GT(count, 50);
-    return std::sqrt(sum / count);
+    return RmsError(rotations, s);
   };
   Recording without = s.recording;
   without.lens_shift.clear();
