@@ -13,8 +13,6 @@ namespace {
 
 constexpr char kStabilised[] = "optical_stabilisation";
 
-bool MovesLens(const std::string& name) { return name == kStabilised || name == "focal_drift"; }
-
 tl::unexpected<Error> Stabilised(const std::string& where) {
   return BadInput(where +
                   ": the lens moves as the camera turns (optical_stabilisation), expected one that "
@@ -30,13 +28,16 @@ Status AddMovingLens(const std::string& file, const Recording& recording,
   EffectSet set;
   std::vector<double> values;
   for (const ListedEffect& effect : *listed) {
-    if (!MovesLens(effect.name)) continue;
+    const EffectEntry* const entry = FindEffect(effect.name);
+    if (entry == nullptr || entry->part != ModelPart::kLens) continue;
     const Result<EffectSet> made =
-        MakeEffects(effect.name + ":" + effect.shape, MakeEffectSetup(recording, *calibration));
+        MakeEffects(effect.name + (effect.shape.empty() ? "" : ":" + effect.shape),
+                    MakeEffectSetup(recording, *calibration));
     if (!made) {
       return BadInput(file + ": effects: " + effect.name +
                       ": not of this recording: " + made.error().message);
     }
+    if (made->items().front().effect->is_constant_lens()) continue;
     if (made->size() != static_cast<int>(effect.values.size())) {
       return BadInput(file + ": effects: " + effect.name + ": has " +
                       std::to_string(effect.values.size()) + " parameters, expected " +

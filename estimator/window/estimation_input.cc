@@ -114,7 +114,9 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   setup.delay_s = calibration.delay_s;
   setup.readout_s = calibration.readout_s;
   setup.R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
-  setup.has_pixels = !recording.matches.empty() || !recording.tracks.empty();
+  // Pictures need not be tracked yet.
+  setup.has_pixels =
+      !recording.matches.empty() || !recording.tracks.empty() || recording.HasImages();
   if (setup.has_pixels) {
     setup.edge_rad = std::atan2(0.5 * setup.size_px.norm(), calibration.lens[kFocal]);
   }

@@ -25,6 +25,7 @@ class MovingLensTest : public CamgyroTest {
   Status Add(const std::string& effects) {
     std::ofstream(Path("calibration.yaml")) << "effects:\n" << effects;
     calibration_.effects.reset();
+    s_.recording.video_file = "pictures.mp4";  // that nobody has tracked
     return AddMovingLens(Path("calibration.yaml"), s_.recording, &calibration_);
   }
   simulation::Simulated s_ = Stabilised();
@@ -32,7 +33,6 @@ class MovingLensTest : public CamgyroTest {
 };
 
 TEST_F(MovingLensTest, IsThatOfTheFile) {
-  s_.recording.tracks.resize(1);  // it has pixels
   const std::string logged =
       "  - {name: optical_stabilisation, shape: logged/0.001, parameters: [{value: 1.01},\n"
       "     {value: 0}, {value: 0.002}, {value: -0.003}]}\n";
