@@ -57,12 +57,10 @@ double ColumnReadoutOf(const Calibration& calibration) {
 Eigen::Vector3d TrueRate(const PairEffects& effects, double time_gyro_s,
                          const Eigen::Vector3d& reading_less_bias) {
   if (effects.set == nullptr) return reading_less_bias;
-  const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
   Eigen::Matrix3Xd columns(3, effects.set->size());
   Eigen::Vector3d rate = reading_less_bias;
   for (int iteration = 0; iteration < 3; ++iteration) {  // the change depends on the rate, weakly
-    effects.set->ChangeRate(time_gyro_s, rate, columns);
-    rate = reading_less_bias - columns * values;
+    rate = reading_less_bias - effects.set->ChangeRate(time_gyro_s, rate, effects.values, columns);
   }
   return rate;
 }

@@ -41,7 +41,9 @@ GyroRate::GyroRate(const Eigen::Matrix3Xd& measured_rad_s, std::vector<int> samp
   CHECK_EQ(std::accumulate(samples_.begin(), samples_.end(), Eigen::Index{0}), base_.cols());
 }
 
-Eigen::MatrixXd GyroRate::EffectColumns(const Eigen::Map<const Eigen::Matrix3Xd>& rates) const {
+Eigen::MatrixXd GyroRate::AddEffects(const Eigen::Map<const Eigen::Matrix3Xd>& rates,
+                                     const double* effects,
+                                     Eigen::Map<Eigen::Matrix3Xd>* readings) const {
   Eigen::MatrixXd E = Eigen::MatrixXd::Zero(3 * measured_.cols(), effects_->size());
   Eigen::Matrix3Xd of_sample(3, effects_->size());
   Eigen::Index n = 0;
@@ -50,7 +52,9 @@ Eigen::MatrixXd GyroRate::EffectColumns(const Eigen::Map<const Eigen::Matrix3Xd>
     for (const Eigen::Index end = n + samples; n < end; ++n) {
       Eigen::Vector3d rate = rates.col(i);
       if (base_.cols() > 0) rate += base_.col(n);
-      effects_->ChangeRate(times_s_[static_cast<size_t>(n)], rate, of_sample);
+      readings->col(i) +=
+          effects_->ChangeRate(times_s_[static_cast<size_t>(n)], rate, effects, of_sample) /
+          samples;
       E.middleRows<3>(3 * i) += of_sample / samples;
     }
   }
@@ -65,11 +69,7 @@ bool GyroRate::Evaluate(double const* const* parameters, double* residuals,
   Eigen::Map<Eigen::Matrix3Xd> r(residuals, 3, n);
   r = (rates - measured_).colwise() + Eigen::Vector3d(bias);
   Eigen::MatrixXd E;
-  if (effects_) {
-    E = EffectColumns(rates);
-    Eigen::Map<Eigen::VectorXd>(residuals, 3 * n) +=
-        E * Eigen::Map<const Eigen::VectorXd>(parameters[2], E.cols());
-  }
+  if (effects_) E = AddEffects(rates, parameters[2], &r);
   r.array() *= inv_sigma_.array();
   if (jacobians == nullptr) return true;
   if (jacobians[0] != nullptr) {

@@ -12,12 +12,12 @@
 
 namespace camgyro {
 
-//   r_n = (w_n + b_g + E_n(w_n) e - w_n_measured) / sigma,  E: EffectSet::ChangeRate
+//   r_n = (w_n + b_g + E_n(w_n, e) - w_n_measured) / sigma,  E: EffectSet::ChangeRate
 //
 // or, of the means of some samples each, whose rates are known but for a correction x_k that they
 // share,
 //
-//   r_k = (x_k + b_g + mean E_n(w0_n + x_k) e - x_k_measured) sqrt(samples) / sigma
+//   r_k = (x_k + b_g + mean E_n(w0_n + x_k, e) - x_k_measured) sqrt(samples) / sigma
 //
 // Parameters  rates              3 n   one rate group, gyro frame [rad/s]
 //             bias_gyro_rad_s    3     gyro frame
@@ -42,8 +42,10 @@ class GyroRate final : public ceres::CostFunction {
                 double** jacobians) const override;
 
  private:
-  // E of all readings at these rates, one below the other.
-  Eigen::MatrixXd EffectColumns(const Eigen::Map<const Eigen::Matrix3Xd>& rates) const;
+  // Adds the effects' change of all readings at these rates to `readings`; returns its derivatives
+  // by the effects, those of the readings one below the other.
+  Eigen::MatrixXd AddEffects(const Eigen::Map<const Eigen::Matrix3Xd>& rates, const double* effects,
+                             Eigen::Map<Eigen::Matrix3Xd>* readings) const;
 
   const Eigen::Matrix3Xd measured_;
   Eigen::Matrix3Xd inv_sigma_;  // of each reading

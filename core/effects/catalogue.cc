@@ -83,13 +83,15 @@ void EffectSet::ChangeObservation(const Observation& observation, Change* change
   }
 }
 
-void EffectSet::ChangeRate(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
-                           RateColumns columns) const {
+Eigen::Vector3d EffectSet::ChangeRate(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
+                                      const double* values, RateColumns columns) const {
   columns.setZero();
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();
   for (const Item& item : items_) {
-    item.effect->ChangeRate(time_gyro_s, omega_gyro_rad_s,
-                            columns.middleCols(item.first, item.effect->size()));
+    change += item.effect->ChangeRateBy(time_gyro_s, omega_gyro_rad_s, values + item.first,
+                                        columns.middleCols(item.first, item.effect->size()));
   }
+  return change;
 }
 
 Eigen::Matrix3d EffectSet::RateByRate(const double* values) const {

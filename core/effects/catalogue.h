@@ -49,8 +49,9 @@ class EffectSet {
   EffectParameter parameter(int column) const;  // its spread: that of the prior in this set
 
   void ChangeObservation(const Observation& observation, Change* change) const;
-  void ChangeRate(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
-                  RateColumns columns) const;
+  // Returns the change at `values` [rad/s]; the columns are its derivatives by them.
+  Eigen::Vector3d ChangeRate(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
+                             const double* values, RateColumns columns) const;
   Eigen::Matrix3d RateByRate(const double* values) const;
   // The lens block with the effects that are a constant part of it.
   LensParameters ConstantLens(const LensParameters& lens, const Eigen::VectorXd& values) const;

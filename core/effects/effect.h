@@ -1,5 +1,5 @@
 // One effect of the catalogue: a way in which cameras and gyros differ from the plain model, as a
-// linear change of one part of the measurement function (docs/architecture.md).
+// change, mostly linear, of one part of the measurement function (docs/architecture.md).
 #ifndef CAMGYRO_CORE_EFFECTS_EFFECT_H_
 #define CAMGYRO_CORE_EFFECTS_EFFECT_H_
 
@@ -82,6 +82,13 @@ class Effect {
   // omega: true rate at that time, gyro frame [rad/s].
   virtual void ChangeRate(double /*time_gyro_s*/, const Eigen::Vector3d& /*omega_gyro_rad_s*/,
                           RateColumns /*columns*/) const {}
+  // The change at parameters `values` [rad/s], and in the columns its derivatives by them: for
+  // effects that are linear only while they are small, which override this one.
+  virtual Eigen::Vector3d ChangeRateBy(double time_gyro_s, const Eigen::Vector3d& omega_gyro_rad_s,
+                                       const double* values, RateColumns columns) const {
+    ChangeRate(time_gyro_s, omega_gyro_rad_s, columns);
+    return columns.lazyProduct(Eigen::Map<const Eigen::VectorXd>(values, size()));
+  }
   // Derivative of the changed reading by the true rate, less the identity, at parameters `values`.
   virtual Eigen::Matrix3d RateByRate(const double* /*values*/) const {
     return Eigen::Matrix3d::Zero();
@@ -93,12 +100,6 @@ class Effect {
   // Made of the gyro's rates, it takes turns of the camera out of the picture: rotations between
   // pictures then tell no focal length.
   virtual bool hides_turns() const { return false; }
-  // For an effect that is linear in its parameters only while they are small: the same one with
-  // columns that make its change at these values exact (secants). Null: it is linear, or near
-  // enough to where it is made for.
-  virtual std::shared_ptr<const Effect> LinearAbout(const double* /*values*/) const {
-    return nullptr;
-  }
   // An effect without parameters, that of every pair's latents instead: the standard deviation
   // which it needs their prior to have, in the latent's unit; 0: as it is.
   virtual double widened_sigma(PairLatent /*latent*/) const { return 0.0; }

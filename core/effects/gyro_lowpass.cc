@@ -12,34 +12,28 @@ namespace {
 
 // A first-order low-pass of time constant T: rate(t) = reading(t) + T reading'(t). It delays by T,
 // which is part of t_d, so that readings of that clock are off by
-//   reading(t) - reading(t - T) - T reading'(t - T) = T^2/2 reading'' - T^3/3 reading''' + ...
-// The parameter is T^2.
+//   reading(t) - reading(t - T) - T reading'(t - T)
+//     = T^2/2 reading'' - T^3/3 reading''' + T^4/8 reading'''' - ...
+// The parameter is T^2. Below zero, where there is no filter, and beyond the reach of the
+// derivatives the change goes on straight.
 class GyroLowpass final : public Effect {
  public:
-  explicit GyroLowpass(const EffectSetup& setup) : GyroLowpass(RateDerivatives(setup), 0.0) {}
-  // The column is the secant to this time constant.
-  GyroLowpass(const RateDerivatives& derivatives, double about_s)
-      : Effect({{"time_constant_sq", "s^2", 4e-4, 0.0, 4e-3}}),
-        derivatives_(derivatives),
-        about_s_(about_s) {}
-  void ChangeRate(double time_s, const Eigen::Vector3d&, RateColumns columns) const override {
+  explicit GyroLowpass(const EffectSetup& setup)
+      : Effect({{"time_constant_sq", "s^2", 4e-4, 0.0, 4e-3}}), derivatives_(setup) {}
+  Eigen::Vector3d ChangeRateBy(double time_s, const Eigen::Vector3d&, const double* values,
+                               RateColumns columns) const override {
     const Eigen::Index at = derivatives_.IndexAt(time_s);
-    if (at < 0) return;
+    if (at < 0) return Eigen::Vector3d::Zero();
     const RateDerivatives::Coefficients c = derivatives_.At(at);
-    columns = (c.row(2) - about_s_ * (2.0 * c.row(3) - 3.0 * about_s_ * c.row(4))).transpose();
-  }
-  std::shared_ptr<const Effect> LinearAbout(const double* values) const override {
-    // What is neglected delays a rotation of 4 Hz by (2 pi 4 Hz)^2 T^3/3 = 13 us for 4 ms.
-    constexpr double kLinear_s = 4e-3;
-    constexpr double kSame_s = 2e-5;  // below its sigma in 40 s of running
-    const double to_s = std::min(std::sqrt(std::max(0.0, values[0])), RateDerivatives::kReach_s);
-    if (std::abs(to_s - about_s_) < (about_s_ == 0.0 ? kLinear_s : kSame_s)) return nullptr;
-    return std::make_shared<GyroLowpass>(derivatives_, to_s);
+    const double T = std::min(std::sqrt(std::max(0.0, values[0])), RateDerivatives::kReach_s);
+    columns = (c.row(2) - T * (3.0 * c.row(3) - 6.0 * T * c.row(4))).transpose();
+    const Eigen::Vector3d of_T =
+        T * T * (c.row(2) - T * (2.0 * c.row(3) - 3.0 * T * c.row(4))).transpose();
+    return of_T + (values[0] - T * T) * columns.col(0);
   }
 
  private:
   const RateDerivatives derivatives_;
-  const double about_s_;
 };
 
 }  // namespace

@@ -40,7 +40,7 @@ Eigen::MatrixXd RateColumnsOf(const AllEffects& all, const std::vector<double>& 
   for (Eigen::Index i = 0; i < rates.cols(); ++i) {
     columns.block<3, 3>(3 * i, 0).setIdentity();
     Eigen::Matrix3Xd effects(3, all.set->size());
-    all.set->ChangeRate(times_s[static_cast<size_t>(i)], rates.col(i), effects);
+    all.set->ChangeRate(times_s[static_cast<size_t>(i)], rates.col(i), all.values.data(), effects);
     columns.block(3 * i, 3, 3, effects.cols()) = effects;
   }
   return columns;

@@ -33,7 +33,8 @@ bool ChangesRates(const EffectSet& effects) {
 }  // namespace
 
 double NeglectedPx(const std::vector<TimedRate>& rates, const PairGraphOptions& options,
-                   double focal_px, const EffectSet& effects, const Eigen::VectorXd& change) {
+                   double focal_px, const EffectSet& effects, const Eigen::VectorXd& from,
+                   const Eigen::VectorXd& to) {
   if (rates.size() < 2 || !ChangesRates(effects)) return 0.0;
   const double interval_s =
       (rates.back().time_s - rates.front().time_s) / static_cast<double>(rates.size() - 1);
@@ -43,8 +44,9 @@ double NeglectedPx(const std::vector<TimedRate>& rates, const PairGraphOptions& 
   for (size_t first = 0; first + step <= rates.size(); first += step) {
     for (size_t i = 0; i < step; ++i) {
       const TimedRate& rate = rates[first + i];
-      effects.ChangeRate(rate.time_s, rate.omega_gyro_rad_s, columns);
-      of_value.col(static_cast<Eigen::Index>(i)) = columns * change;
+      of_value.col(static_cast<Eigen::Index>(i)) =
+          effects.ChangeRate(rate.time_s, rate.omega_gyro_rad_s, to.data(), columns) -
+          effects.ChangeRate(rate.time_s, rate.omega_gyro_rad_s, from.data(), columns);
     }
     of_value.colwise() -= of_value.rowwise().mean().eval();
     Eigen::Vector3d turn = Eigen::Vector3d::Zero();

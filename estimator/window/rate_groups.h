@@ -29,11 +29,12 @@ enum class AddPairResult {
   kTooFewMatches,  // fewer than PairGraph::kMinMatches with a residual
 };
 
-// What groups neglect when effects change by so much after they were made: how the rates of one
-// value's samples change against their mean. The largest turn by that within a value, in pixels.
-// rates: in time order.
+// What groups neglect when effects change after they were made, from values to others: how the
+// rates of one value's samples change against their mean. The largest turn by that within a value,
+// in pixels. rates: in time order.
 double NeglectedPx(const std::vector<TimedRate>& rates, const PairGraphOptions& options,
-                   double focal_px, const EffectSet& effects, const Eigen::VectorXd& change);
+                   double focal_px, const EffectSet& effects, const Eigen::VectorXd& from,
+                   const Eigen::VectorXd& to);
 
 class RateGroups {
  public:

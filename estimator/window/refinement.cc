@@ -180,7 +180,7 @@ class Refinement {
     if (TurnOfScan(pairs_.front(), now, built_at_) > kTurnedScan) return true;
     if (now.effects == nullptr || facts_.of_attitudes) return false;
     return NeglectedPx(input_.rates, graph_options_, built_at_.lens[kFocal], *now.effects,
-                       now.effect_values - built_at_.effect_values) > graph_options_.rate_step_px;
+                       built_at_.effect_values, now.effect_values) > graph_options_.rate_step_px;
   }
 
   // The graph at the present calibration.

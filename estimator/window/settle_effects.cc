@@ -19,9 +19,6 @@ void RemakeEffects(const Recording& recording, Calibration* calibration) {
             own.entry->shape_by_fit(own.shape, calibration->effect_values.data() + own.first);
       }
       own.effect = own.entry->make(setup, own.shape);
-    } else if (auto about =
-                   own.effect->LinearAbout(calibration->effect_values.data() + own.first)) {
-      own.effect = std::move(about);
     }
     set->Add(own);
   }
@@ -31,10 +28,8 @@ void RemakeEffects(const Recording& recording, Calibration* calibration) {
 bool HasToSettle(const Calibration& c) {
   if (c.effects == nullptr) return false;
   return std::any_of(
-      c.effects->items().begin(), c.effects->items().end(), [&](const EffectSet::Item& item) {
-        return item.effect->depends_on_calibration() ||
-               item.effect->LinearAbout(c.effect_values.data() + item.first) != nullptr;
-      });
+      c.effects->items().begin(), c.effects->items().end(),
+      [&](const EffectSet::Item& item) { return item.effect->depends_on_calibration(); });
 }
 
 Refined SettleEffects(const Recording& recording, Refined fit, const Refit& refit) {

@@ -1,4 +1,4 @@
-// Effects that depend on the calibration which they are part of, or on their own values.
+// Effects that depend on the calibration which they are part of.
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_SETTLE_EFFECTS_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_SETTLE_EFFECTS_H_
 
@@ -10,12 +10,10 @@
 
 namespace camgyro {
 
-// Makes those effects anew that depend on the calibration, in the shape that it says, or on their
-// values.
+// Makes those effects anew that depend on the calibration, in the shape that it says.
 void RemakeEffects(const Recording& recording, Calibration* calibration);
 
-// Are effects of it to be made anew, for the calibration that they depend on, or since they are
-// linear about other values?
+// Are there effects in it that depend on it?
 bool HasToSettle(const Calibration& calibration);
 
 // A fit with those effects made anew, and refitted, until it stays within a tenth of a sigma: what

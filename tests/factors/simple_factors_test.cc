@@ -1,8 +1,11 @@
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <memory>
+#include <vector>
 
 #include "core/effects/catalogue.h"
+#include "core/pair_model.h"
 #include "factors/bias_walk.h"
 #include "factors/gyro_rate.h"
 #include "tests/factors/difference_check.h"
@@ -68,6 +71,47 @@ TEST(GyroRate, MeansOfSamplesHaveTheMeanOfTheEffects) {
   ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
   EXPECT_LT(r.norm(), 1e-10);
   ExpectJacobiansMatchDifferences(factor, {corrections.data(), bias.data(), scale.data()}, 1e-6);
+}
+
+// What TrueRate takes for the true rates fits without a residual, also with an effect that is not
+// linear in its parameter.
+TEST(GyroRate, AgreesWithTheTrueRates) {
+  auto gyro = std::make_shared<SensorSamples>();
+  gyro->values.resize(3, 41);
+  std::vector<double> times_s;
+  for (Eigen::Index i = 0; i < gyro->values.cols(); ++i) {
+    times_s.push_back(0.005 * static_cast<double>(i));
+    const double phase = 25.0 * times_s.back();
+    gyro->values.col(i) << std::sin(phase), std::cos(phase), std::sin(phase + 1.0);
+  }
+  gyro->times_s = times_s;
+  EffectSetup setup;
+  setup.gyro = gyro;
+  const auto effects = MakeEffects("gyro_lowpass", setup);
+  ASSERT_TRUE(effects);
+  const auto set = std::make_shared<const EffectSet>(*effects);
+  double value = 0.012 * 0.012;
+  const Eigen::Matrix3Xd measured = gyro->values.middleCols(18, 4);
+  const std::vector<double> four(times_s.begin() + 18, times_s.begin() + 22);
+  Eigen::Vector3d bias(0.003, -0.002, 0.001);
+  Eigen::Matrix3Xd rates(3, 4);
+  for (int i = 0; i < 4; ++i) {
+    rates.col(i) =
+        TrueRate({set.get(), &value}, four[static_cast<size_t>(i)], measured.col(i) - bias);
+  }
+  const double* parameters[] = {rates.data(), bias.data(), &value};
+  Eigen::Matrix<double, 12, 1> r;
+  const GyroRate each(measured, {0.003, 0.003, 0.003}, set, four);
+  ASSERT_TRUE(each.Evaluate(parameters, r.data(), nullptr));
+  EXPECT_LT(r.norm(), 1e-9);
+  ExpectJacobiansMatchDifferences(each, {rates.data(), bias.data(), &value}, 1e-7);
+  // Of the mean of all, about those rates.
+  Eigen::Vector3d correction = Eigen::Vector3d::Zero();
+  const GyroRate mean((measured - rates).rowwise().mean(), {4}, {0.003, 0.003, 0.003}, set, four,
+                      rates);
+  const double* of_mean[] = {correction.data(), bias.data(), &value};
+  ASSERT_TRUE(mean.Evaluate(of_mean, r.data(), nullptr));
+  EXPECT_LT(r.head<3>().norm(), 1e-9);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include "estimator/window/direction_search.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
-#include "estimator/window/settle_effects.h"
 #include "factors/coplanarity_plane.h"
 #include "simulation/simulate.h"
 
@@ -102,10 +101,6 @@ TEST_P(EffectAgainstSimulator, FitsItsPixels) {
       mean += sample.accel_gyro_m_s2 / static_cast<double>(simulated->recording.accel.size());
     }
     calibration.bias_gyro_rad_s += mean.cwiseProduct(calibration.effect_values.head<3>());
-  }
-  // Some are linear about their values only.
-  if (effects->items().front().entry->part == ModelPart::kRate) {
-    RemakeEffects(simulated->recording, &calibration);
   }
   const double with = Rms(input, calibration);
   EXPECT_LT(with, without / test.gain) << "without " << without << " px, with " << with << " px";

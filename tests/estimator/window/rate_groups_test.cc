@@ -28,20 +28,20 @@ TEST(NeglectedPx, IsTheTurnWithinAValue) {
   const PairGraphOptions options;
   ASSERT_EQ(options.RateStep(0.005, kFocalPx), 5);
   const double px = NeglectedPx(Speeding(), options, kFocalPx, Made("gyro_scale"),
-                                Eigen::Vector3d(0.01, 0.0, 0.0));
+                                Eigen::Vector3d(0.03, 0.0, 0.0), Eigen::Vector3d(0.04, 0.0, 0.0));
   EXPECT_NEAR(px, kFocalPx * 3.0 * 5e-4 * 0.005, 1e-9);
   EXPECT_NEAR(NeglectedPx(Speeding(), options, kFocalPx, Made("gyro_scale"),
-                          Eigen::Vector3d(0.0, 0.01, 0.0)),
+                          Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.01, 0.0)),
               0.0, 1e-12);
 }
 
 TEST(NeglectedPx, IsNothingWithoutEffectsOfTheRatesOrOfSingleSamples) {
   PairGraphOptions options;
   EXPECT_EQ(NeglectedPx(Speeding(), options, kFocalPx, Made("radial_distortion:radtan"),
-                        Eigen::Vector2d(0.1, 0.1)),
+                        Eigen::Vector2d::Zero(), Eigen::Vector2d(0.1, 0.1)),
             0.0);
   options.rate_step_s = 0.0;
-  EXPECT_EQ(NeglectedPx(Speeding(), options, kFocalPx, Made("gyro_scale"),
+  EXPECT_EQ(NeglectedPx(Speeding(), options, kFocalPx, Made("gyro_scale"), Eigen::Vector3d::Zero(),
                         Eigen::Vector3d(0.1, 0.1, 0.1)),
             0.0);
 }
