@@ -3,9 +3,8 @@
 #include <ceres/autodiff_cost_function.h>
 #include <glog/logging.h>
 
-#include <Eigen/Cholesky>
-
 #include "core/calibration.h"
+#include "core/linear_algebra.h"
 #include "core/so3.h"
 
 namespace camgyro {
@@ -13,23 +12,14 @@ namespace {
 
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
-// A root of the inverse of a delta's covariance.
-Matrix9d SqrtInformation(const Matrix9d& covariance) {
-  // Velocities, positions and angles differ by orders of magnitude: unit diagonal first.
-  const Eigen::Matrix<double, 9, 1> scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<Matrix9d> llt(scale.asDiagonal() * covariance * scale.asDiagonal());
-  CHECK(llt.info() == Eigen::Success) << covariance;
-  Matrix9d root = Matrix9d::Identity();
-  llt.matrixL().solveInPlace(root);
-  return root * scale.asDiagonal();
-}
-
 class Preintegration {
  public:
   explicit Preintegration(const PreintegrationMeasurement& m)
       : delta_(m.delta),
         gravity_m_s2_(m.gravity_m_s2),
-        sqrt_information_(SqrtInformation(m.covariance)) {}
+        sqrt_information_(InverseRoot(m.covariance)) {
+    CHECK(sqrt_information_.allFinite()) << "covariance:\n" << m.covariance;
+  }
 
   // Biases as differences from those that were taken out.
   template <typename T>

@@ -3,21 +3,19 @@
 #include <ceres/autodiff_cost_function.h>
 #include <glog/logging.h>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace camgyro {
 namespace {
 
 class Factor {
  public:
-  explicit Factor(const RelativeYawPosition& measured) : measured_(measured) {
-    // The root of the inverse; sigmas of metres and microradians may stand beside each other.
-    const Eigen::Vector4d scale = measured.covariance.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::LLT<Eigen::Matrix4d> llt(scale.asDiagonal() * measured.covariance *
-                                          scale.asDiagonal());
-    CHECK(llt.info() == Eigen::Success) << "covariance:\n" << measured.covariance;
-    sqrt_info_ = llt.matrixL().solve(Eigen::Matrix4d(scale.asDiagonal()));
+  explicit Factor(const RelativeYawPosition& measured)
+      : measured_(measured), sqrt_info_(InverseRoot(measured.covariance)) {
+    CHECK(sqrt_info_.allFinite()) << "covariance:\n" << measured.covariance;
   }
 
   template <typename T>

@@ -1,6 +1,6 @@
 #include "pipeline/combine.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -55,7 +55,8 @@ void TakePriorOut(const RecordingEstimate& e, const Indices& at, Measurement* m)
   }
   const Eigen::VectorXd inverse = scale.cwiseInverse();
   const Eigen::MatrixXd precision =
-      (inverse.asDiagonal() * Block(e.covariance, at) * inverse.asDiagonal()).inverse();
+      SymmetricSolver(inverse.asDiagonal() * Block(e.covariance, at) * inverse.asDiagonal())
+          .Inverse();
   const SymmetricSpectrum eigen = SpectrumOfSymmetric(precision);
   const Eigen::VectorXd data = (eigen.values.array() - 1.0).max(kLeastInformation);
   const Eigen::MatrixXd covariance =
@@ -176,7 +177,7 @@ Eigen::MatrixXd InformationOf(const Measurement& m, const Eigen::VectorXd& betwe
   if (m.measured.empty()) return information;
   Eigen::MatrixXd covariance = m.covariance;
   covariance.diagonal() += between_sq;
-  SetBlock(Block(covariance, m.measured).inverse(), m.measured, &information);
+  SetBlock(SymmetricSolver(Block(covariance, m.measured)).Inverse(), m.measured, &information);
   return information;
 }
 
@@ -203,7 +204,7 @@ Agreement AgreementOf(const std::vector<Measurement>& all, const std::vector<boo
   for (Eigen::Index i = 0; i < n; ++i) {
     if (sum(i, i) == 0.0) sum(i, i) = 1.0;  // measured by none: stays apart
   }
-  const Eigen::VectorXd mean = sum.inverse() * eta;
+  const Eigen::VectorXd mean = SymmetricSolver(sum).Solve(eta);
   for (size_t r = 0; r < all.size(); ++r) {
     if (r == left_out) continue;
     Eigen::VectorXd d = all[r].value - mean;
@@ -241,8 +242,8 @@ void Weigh(const std::vector<RecordingEstimate>& estimates, const std::vector<Me
   for (const RecordingEstimate& e : estimates) {
     prior_mean += e.prior_value / static_cast<double>(estimates.size());
   }
-  const Eigen::VectorXd scale = estimates.front().prior_sigma;
-  const Eigen::MatrixXd prior = scale.cwiseAbs2().cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd prior =
+      estimates.front().prior_sigma.cwiseAbs2().cwiseInverse().asDiagonal();
   Eigen::MatrixXd sum = prior;
   Eigen::VectorXd eta = prior * prior_mean;
   std::vector<Eigen::MatrixXd> information;
@@ -251,10 +252,7 @@ void Weigh(const std::vector<RecordingEstimate>& estimates, const std::vector<Me
     sum += information.back();
     eta += information.back() * m.value;
   }
-  // Units differ by orders of magnitude: inverted in those of the prior.
-  const Eigen::MatrixXd inverse = scale.asDiagonal() *
-                                  (scale.asDiagonal() * sum * scale.asDiagonal()).inverse().eval() *
-                                  scale.asDiagonal();
+  const Eigen::MatrixXd inverse = SymmetricSolver(sum).Inverse();
   c->value = inverse * eta;
   c->covariance = inverse * prior * inverse;
   c->between = Eigen::MatrixXd::Zero(n, n);

@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/frame_time_test.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <random>
 #include <utility>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "estimator/diagnosis/pair_system.h"
 #include "estimator/diagnosis/thresholds.h"
@@ -40,9 +42,8 @@ Projected Project(const PairSystem& s) {
   Eigen::MatrixXd A = s.N.transpose() * s.N;
   A.diagonal() += s.prior;
   A.diagonal().array() += 1e-9;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(A);
   const Eigen::MatrixXd NJ = s.N.transpose() * J;
-  const Eigen::MatrixXd X = solver.solve(NJ);
+  const Eigen::MatrixXd X = SymmetricSolver(A).Solve(NJ);
   Projected p;
   p.half.g =
       J.transpose() * s.r - X.transpose() * (s.N.transpose() * s.r + s.prior.cwiseProduct(s.at));
@@ -83,10 +84,7 @@ Eigen::VectorXd ModelStep(const std::vector<HalvesOfPair>& pairs, size_t half,
     H += pair.halves[half].H.topLeftCorner(n, n);
     g += pair.halves[half].g.head(n);
   }
-  const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd unit = scale.asDiagonal() * H * scale.asDiagonal();
-  unit.diagonal().array() += 1e-10;
-  return -scale.cwiseProduct(unit.ldlt().solve(scale.cwiseProduct(g)));
+  return -SymmetricSolver(H, kSmallRidge).Solve(g);
 }
 
 // Score and information of bias and offsets in one half, the model projected out of all pairs.
@@ -136,7 +134,7 @@ Rows3 WithoutTimes(const Own& own) {
   W.diagonal().array() += std::pow(kMostTimesS, -2.0);
   Rows3 T = Rows3::Zero();
   T.leftCols<3>().setIdentity();
-  T.rightCols<2>() = -W.ldlt().solve(own.W.bottomLeftCorner<2, 3>()).transpose();
+  T.rightCols<2>() = -(W.inverse() * own.W.bottomLeftCorner<2, 3>()).transpose();
   return T;
 }
 
@@ -175,9 +173,9 @@ double InCommon(const Own& a, const Own& b, const Transform& T_a, const Transfor
   using Small = Eigen::Matrix<double, Transform::RowsAtCompileTime, Transform::RowsAtCompileTime>;
   Small W = 0.5 * (T_a * a.W * T_a.transpose() + T_b * b.W * T_b.transpose());
   W.diagonal() += prior;
-  const Eigen::LDLT<Small> solver(W);
+  const Small inverse = W.inverse();
   const Small C = T_a * common * T_b.transpose();
-  return (T_a * a.s).dot(solver.solve(T_b * b.s)) - solver.solve(C).trace();
+  return (T_a * a.s).dot(inverse * (T_b * b.s)) - (inverse * C).trace();
 }
 
 }  // namespace

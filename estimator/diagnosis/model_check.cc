@@ -1,6 +1,6 @@
 #include "estimator/diagnosis/model_check.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/format.h"
+#include "core/linear_algebra.h"
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/gain_rule.h"
 #include "estimator/diagnosis/pair_scores.h"
@@ -129,10 +130,9 @@ Usual UsualGiven(const Tested& t, double inflation) {
   Eigen::MatrixXd information =
       u.sigma.asDiagonal() * p.information * u.sigma.asDiagonal() / inflation;
   information.diagonal().array() += 1.0;
-  const Eigen::LLT<Eigen::MatrixXd> solver(information);
-  u.c_hat = -solver.solve(u.sigma.cwiseProduct(p.score) / inflation);
-  u.C = solver.solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())) +
-        u.c_hat * u.c_hat.transpose();
+  const SymmetricSolver solver(information);
+  u.c_hat = -solver.Solve(u.sigma.cwiseProduct(p.score) / inflation);
+  u.C = solver.Inverse() + u.c_hat * u.c_hat.transpose();
   u.X = p.shift.topRows<kStateSize>() * u.sigma.asDiagonal();
   return u;
 }
@@ -157,7 +157,7 @@ void ExplainHalves(const Tested& t, const Usual& u, CalibrationReport* report) {
       scale.asDiagonal() * (4.0 / chi2) * c.covariance * scale.asDiagonal();
   const StateCovariance by_effects =
       scale.asDiagonal() * apart * u.C * apart.transpose() * scale.asDiagonal();
-  const double expected = 1.0 + noise.ldlt().solve(by_effects).trace() / kStateSize;
+  const double expected = 1.0 + SymmetricSolver(noise).Solve(by_effects).trace() / kStateSize;
   const double left = std::max(1.0, chi2 / expected);
   c.covariance *= left / chi2;
   c.effect_covariance *= left / chi2;
@@ -207,7 +207,7 @@ void AddTotal(const Tested& t, const Usual& u, const StateVector& own_fit,
     // as they were.
     const Eigen::MatrixXd XC = u.X * u.C.middleCols(at, n);
     const StateVector variance =
-        (XC * u.C.block(at, at, n, n).ldlt().solve(XC.transpose())).diagonal();
+        (XC * SymmetricSolver(u.C.block(at, at, n, n)).Solve(XC.transpose())).diagonal();
     report->systematic.push_back({effect.effect, variance.cwiseMax(0.0).cwiseSqrt()});
     at += n;
   }

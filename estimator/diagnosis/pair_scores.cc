@@ -1,12 +1,13 @@
 #include "estimator/diagnosis/pair_scores.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "estimator/diagnosis/pair_system.h"
 #include "estimator/window/pair_graph.h"
@@ -42,11 +43,11 @@ PairAlone ProjectOwnOut(const PairSystem& s, const TimedPair& pair) {
   Eigen::MatrixXd A = N.transpose() * N;
   A.diagonal() += prior;
   A.diagonal().array() += 1e-9;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(A);
+  const SymmetricSolver solver(A);
   const Eigen::MatrixXd NJ = N.transpose() * s.J;
   const Eigen::VectorXd Nr = N.transpose() * s.r + prior.cwiseProduct(at);
-  const Eigen::MatrixXd X = solver.solve(NJ);
-  const Eigen::VectorXd x = solver.solve(Nr);
+  const Eigen::MatrixXd X = solver.Solve(NJ);
+  const Eigen::VectorXd x = solver.Solve(Nr);
   p.g = s.J.transpose() * s.r - NJ.transpose() * x;
   p.H = Eigen::MatrixXd::Zero(s.J.cols(), s.J.cols());
   p.H.selfadjointView<Eigen::Lower>().rankUpdate(s.J.transpose());
@@ -59,7 +60,7 @@ PairAlone ProjectOwnOut(const PairSystem& s, const TimedPair& pair) {
     p.frames = {pair.frame_a, pair.frame_b};
     p.frame_time_prior = s.prior[first];
     p.times_g = T.transpose() * s.r - NT.transpose() * x;
-    p.times_H = T.transpose() * T - NT.transpose() * solver.solve(NT);
+    p.times_H = T.transpose() * T - NT.transpose() * solver.Solve(NT);
     p.times_by_columns = T.transpose() * s.J - NT.transpose() * X;
     const Eigen::Vector2d to_stamps = -s.at.segment<2>(first);
     const Eigen::VectorXd change = p.times_H * to_stamps;
@@ -103,10 +104,10 @@ class TimesOfBlock {
       }
     }
     if (frames == 0) return;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(D);
-    log_det_ += solver.vectorD().array().log().sum();
-    by_columns_ = -solver.solve(by_columns);
-    best_s_ = -solver.solve(b);
+    const SymmetricSolver solver(D);
+    log_det_ += solver.LogDeterminant();
+    by_columns_ = -solver.Solve(by_columns);
+    best_s_ = -solver.Solve(b);
   }
 
   bool empty() const { return rows_.empty(); }
@@ -160,19 +161,17 @@ void SumUp(const std::vector<PairAlone>& projected, int num_model, std::vector<P
 // and W its information, 2 log L(s) = u (W + s^-2)^-1 u - log det(1 + s^2 W).
 double GainOfFreeBend(const PairSystem& s) {
   if (s.bend_column < 0) return 0.0;
-  const Eigen::Index at = s.bend_column, n = s.N.cols();
+  const Eigen::Index at = s.bend_column;
   Eigen::VectorXd wide = s.prior;
   wide.segment<6>(at) = s.free_bend;
   const auto two_log = [&](const Eigen::VectorXd& prior) {
     Eigen::MatrixXd B = s.N.transpose() * s.N;
     B.diagonal() += prior;
     B.diagonal().array() += 1e-9;
-    const Eigen::LDLT<Eigen::MatrixXd> factor(B);
-    double log_det = 0.0;
-    for (Eigen::Index i = 0; i < n; ++i) log_det += std::log(factor.vectorD()[i]);
+    const SymmetricSolver solver(B);
     const Eigen::VectorXd b = s.N.transpose() * s.r + prior.cwiseProduct(s.at);
-    return b.dot(factor.solve(b)) - s.at.dot(prior.cwiseProduct(s.at)) - log_det +
-           prior.segment<6>(at).array().log().sum();
+    return b.dot(solver.Solve(b).col(0)) - s.at.dot(prior.cwiseProduct(s.at)) -
+           solver.LogDeterminant() + prior.segment<6>(at).array().log().sum();
   };
   return two_log(wide) - two_log(s.prior);
 }

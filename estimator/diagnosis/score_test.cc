@@ -1,6 +1,6 @@
 #include "estimator/diagnosis/score_test.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -51,25 +51,6 @@ std::vector<int> ModelColumns(const Scores& scores) {
   return model;
 }
 
-// Symmetric positive solve that survives columns without information: unit diagonal, small ridge.
-class Solver {
- public:
-  explicit Solver(const Eigen::MatrixXd& H)
-      : scale_(H.diagonal().cwiseMax(1e-30).cwiseSqrt().cwiseInverse()) {
-    Eigen::MatrixXd unit = scale_.asDiagonal() * H * scale_.asDiagonal();
-    unit.diagonal().array() += 1e-10;
-    ldlt_.compute(unit);
-  }
-  template <typename Derived>
-  typename Derived::PlainObject Solve(const Eigen::MatrixBase<Derived>& b) const {
-    return scale_.asDiagonal() * ldlt_.solve(scale_.asDiagonal() * b);
-  }
-
- private:
-  Eigen::VectorXd scale_;
-  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
-};
-
 // Score, information and residual scores by block of `columns`, the model's projected out.
 struct Effective {
   Eigen::VectorXd s;
@@ -86,7 +67,7 @@ Effective Project(const Scores& scores, const std::vector<int>& columns,
   const std::vector<int> model = ModelColumns(scores);
   Eigen::MatrixXd H_mm = Pick(sum.H, model, model);
   H_mm.diagonal() += Pick(prior_information, model);
-  const Solver model_solver(H_mm);
+  const SymmetricSolver model_solver(H_mm, kSmallRidge);
   const Eigen::MatrixXd H_mc = Pick(sum.H, model, columns);
   Effective e;
   e.X = model_solver.Solve(H_mc);
@@ -97,8 +78,8 @@ Effective Project(const Scores& scores, const std::vector<int>& columns,
   e.M = 0.5 * (e.M + e.M.transpose()).eval();
   Eigen::MatrixXd with_prior = e.M;
   with_prior.diagonal() += Pick(prior_information, columns);
-  e.estimate = -Solver(with_prior).Solve(e.s);
-  const Eigen::VectorXd model_step = -model_solver.Solve(Eigen::VectorXd(g_m + H_mc * e.estimate));
+  e.estimate = -SymmetricSolver(with_prior, kSmallRidge).Solve(e.s);
+  const Eigen::VectorXd model_step = -model_solver.Solve(g_m + H_mc * e.estimate);
   for (const BlockScore& block : scores.blocks) {
     const Eigen::VectorXd left_m = Pick(block.g, model) + Pick(block.H, model, model) * model_step +
                                    Pick(block.H, model, columns) * e.estimate;
@@ -159,7 +140,7 @@ ScoreTest Judge(const Effective& e, const Eigen::VectorXd& prior, const Scatter&
   test.p_value = FTail(test.statistic / test.dof, test.dof, dof);
   Eigen::MatrixXd with_prior = e.M / test.inflation;
   with_prior.diagonal() += prior;
-  test.covariance = with_prior.inverse();
+  test.covariance = SymmetricSolver(with_prior).Inverse();
   return test;
 }
 
@@ -270,7 +251,7 @@ Eigen::VectorXd StepOf(const Scores& scores, const std::vector<int>& columns,
   free.insert(free.end(), columns.begin(), columns.end());
   Eigen::MatrixXd H = Pick(sum.H, free, free);
   H.diagonal() += Pick(prior_information, free);
-  const Eigen::VectorXd x = -Solver(H).Solve(Pick(sum.g, free));
+  const Eigen::VectorXd x = -SymmetricSolver(H, kSmallRidge).Solve(Pick(sum.g, free));
   Eigen::VectorXd step = Eigen::VectorXd::Zero(sum.g.size());
   for (size_t i = 0; i < free.size(); ++i) step[free[i]] = x[static_cast<Eigen::Index>(i)];
   return step;
@@ -319,12 +300,9 @@ double AliasOf(const Scores& scores, const std::vector<int>& first, const std::v
   A.diagonal() += Pick(prior_information, first);
   B.diagonal() += Pick(prior_information, second);
   // Canonical correlations: singular values of A^-1/2 C B^-1/2.
-  const Eigen::MatrixXd L_A = A.llt().matrixL(), L_B = B.llt().matrixL();
-  Eigen::MatrixXd C = e.M.topRightCorner(n, m);
-  C = L_A.triangularView<Eigen::Lower>().solve(C);
-  C = L_B.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd(C.transpose())).transpose();
+  const Eigen::MatrixXd C = InverseRoot(A) * e.M.topRightCorner(n, m) * InverseRoot(B).transpose();
   if (C.size() == 1) return C(0, 0);
-  return C.jacobiSvd().singularValues()[0];
+  return LargestSingularValue(C);
 }
 
 }  // namespace camgyro

@@ -34,6 +34,16 @@ double YawBetween(const Quaterniond& a, const Quaterniond& b) {
   return std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1));
 }
 
+// The shortest rotation that turns this gravity down the world's z; about any level axis where it
+// points up. (Quaternion::FromTwoVectors is an SVD, which takes GCC 8 s to compile.)
+Quaterniond ShortestToLevel(const Vector3d& gravity) {
+  const Vector3d from = gravity.normalized(), down = -Vector3d::UnitZ();
+  const Vector3d middle = from + down;
+  if (middle.squaredNorm() < 1e-16) return {0.0, 1.0, 0.0, 0.0};
+  const Vector3d axis = from.cross(middle.normalized());
+  return {from.dot(middle.normalized()), axis.x(), axis.y(), axis.z()};
+}
+
 }  // namespace
 
 void Odometry::TryStart() {
@@ -171,8 +181,7 @@ Status Odometry::Begin(const VinsStart& start) {
   if (anchor_) reckoned = DeadReckoned(start.states.front().time_ns);
 
   // From the start's world, whose axes are those of its first keyframe, to ours.
-  Quaterniond q_world_start =
-      Quaterniond::FromTwoVectors(start.gravity_world_m_s2, -Vector3d::UnitZ());
+  Quaterniond q_world_start = ShortestToLevel(start.gravity_world_m_s2);
   Vector3d first_position = anchor_ ? anchor_->state.p_world_m : Vector3d::Zero();
   if (reckoned) {
     const Quaterniond q_first = q_world_start * start.states.front().q_world_gyro;

@@ -4,11 +4,12 @@
 #include <ceres/sphere_manifold.h>
 #include <glog/logging.h>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "core/linear_algebra.h"
 #include "core/so3.h"
 #include "core/time.h"
 #include "estimator/odometry/pixel_noise.h"
@@ -45,15 +46,6 @@ StateVector LeastSigma() {
   StateVector least;
   least << 1e-2, 1e-2, 1e-2, 1e-6, 1e-6, Vector3d::Constant(1e-7), Vector3d::Constant(1e-6);
   return least;
-}
-
-// The root of an inverse covariance; its diagonal may span orders of magnitude.
-MatrixXd InverseRoot(const MatrixXd& covariance) {
-  const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  MatrixXd root = MatrixXd::Identity(covariance.rows(), covariance.cols());
-  const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * covariance * scale.asDiagonal());
-  llt.matrixL().solveInPlace(root);
-  return root * scale.asDiagonal();
 }
 
 // Counts a homogeneous point from an origin that has moved; returns the derivative of its tangent's
@@ -344,14 +336,12 @@ Result<OdometryWindow::Covariance> OdometryWindow::ComputeCovariance(bool of_all
       CannotEstimate("the odometry's window does not determine its state");
   if (!sound) return failed;
   const MatrixXd& H = information.All().H;
-  const VectorXd unit = H.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<MatrixXd> llt(unit.asDiagonal() * H * unit.asDiagonal());
-  if (llt.info() != Eigen::Success || !unit.allFinite()) return failed;
+  const SymmetricSolver solver(H);
+  if (!solver.positive_definite()) return failed;
   const auto block = [&](Eigen::Index first, Eigen::Index size) {
     MatrixXd columns = MatrixXd::Zero(H.rows(), size);
-    columns.middleRows(first, size) = unit.segment(first, size).asDiagonal();
-    return MatrixXd(unit.segment(first, size).asDiagonal() *
-                    MatrixXd(llt.solve(columns)).middleRows(first, size));
+    columns.middleRows(first, size).setIdentity();
+    return MatrixXd(solver.Solve(columns).middleRows(first, size));
   };
   Covariance result;
   const Eigen::Index shared = information.ColumnOf(calibration_.data());

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/format.h"
+#include "core/linear_algebra.h"
 #include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "core/time.h"
@@ -186,7 +187,7 @@ struct LensFit {
 // time, in which residuals may be correlated.
 StabiliserFit::Covariance CovarianceOf(const Eigen::MatrixXd& J, const Eigen::VectorXd& residuals) {
   using Matrix = StabiliserFit::Covariance;
-  const Matrix inverse = (J.transpose() * J).eval().ldlt().solve(Eigen::MatrixXd::Identity(kN, kN));
+  const Matrix inverse = SymmetricSolver(J.transpose() * J).Inverse();
   const Eigen::Index pairs = (J.rows() - kN) / 3;
   Matrix meat = Matrix::Zero();
   for (Eigen::Index block = 0; block < kTimeBlocks; ++block) {

@@ -8,7 +8,7 @@
 #include <ceres/solver.h>
 #include <ceres/sphere_manifold.h>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
@@ -16,6 +16,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/linear_algebra.h"
 #include "core/robust_statistics.h"
 #include "core/time.h"
 #include "factors/preintegration.h"
@@ -190,13 +191,8 @@ class Problem {
     const Calibration& given = window_.calibration;
     StateCovariance covariance = given.total_covariance.value_or(given.covariance);
     covariance.diagonal() += least.cwiseAbs2();
-    const StateVector scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-    const StateCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-    StateCovariance root = StateCovariance::Identity();
-    correlation.llt().matrixL().solveInPlace(root);
-    const Eigen::MatrixXd calibration_root = root * scale.asDiagonal();
     problem_->AddResidualBlock(
-        new ceres::NormalPrior(calibration_root, Eigen::VectorXd::Zero(kStateSize)), nullptr,
+        new ceres::NormalPrior(InverseRoot(covariance), Eigen::VectorXd::Zero(kStateSize)), nullptr,
         calibration_.data());
     problem_->AddResidualBlock(
         new ceres::NormalPrior(Matrix3d::Identity() / options_.accel_bias_sigma_m_s2,

@@ -1,13 +1,14 @@
 // The frames' own times in a PairGraph.
 #include <glog/logging.h>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <set>
 
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "core/robust_statistics.h"
 #include "estimator/window/kept_cost.h"
@@ -45,7 +46,7 @@ class LocalEquations {
   }
   // A step of Gauss and Newton.
   void Step(FactorGraph* graph) const {
-    const Eigen::VectorXd step = -H_.ldlt().solve(g_);
+    const Eigen::VectorXd step = -SymmetricSolver(H_).Solve(g_);
     if (!step.allFinite()) return;
     for (const auto& [id, at] : columns_) {
       Eigen::Map<Eigen::VectorXd> value = graph->value(id);
@@ -154,17 +155,17 @@ PairTimes PairGraph::FrameTimesOf(const Pair& pair) const {
   const Eigen::Index rest = equations.g().size() - 2;
   Eigen::MatrixXd H_rest = equations.H().bottomRightCorner(rest, rest);
   H_rest.diagonal().array() += 1e-9;  // a direction that nothing determines
-  const Eigen::LDLT<Eigen::MatrixXd> solver(H_rest);
+  const SymmetricSolver solver(H_rest);
   const Eigen::MatrixXd mixed = equations.H().bottomLeftCorner(rest, 2);
   PairTimes times;
   times.frame_a = pair.frame_times[0];
   times.frame_b = pair.frame_times[1];
-  times.information = equations.H().topLeftCorner<2, 2>() - mixed.transpose() * solver.solve(mixed);
+  times.information = equations.H().topLeftCorner<2, 2>() - mixed.transpose() * solver.Solve(mixed);
   const double a = graph_.value(FrameTimeBlock(times.frame_a))[0];
   const double b = graph_.value(FrameTimeBlock(times.frame_b))[0];
   // The score at offsets of zero, from that where they are.
   times.score = equations.g().head<2>() -
-                mixed.transpose() * solver.solve(equations.g().tail(rest)) -
+                mixed.transpose() * solver.Solve(equations.g().tail(rest)) -
                 times.information * Eigen::Vector2d(a, b);
   return times;
 }

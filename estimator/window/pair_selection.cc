@@ -1,10 +1,11 @@
 #include "estimator/window/pair_selection.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/linear_algebra.h"
 #include "core/robust_statistics.h"
 
 namespace camgyro {
@@ -58,7 +59,7 @@ double UnsmoothVariance(const std::vector<Match>& matches, const Eigen::Vector2d
   Eigen::MatrixX2d rest;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Eigen::MatrixXd WA = weights.asDiagonal() * A;
-    rest = moved - A * (A.transpose() * WA).ldlt().solve(WA.transpose() * moved);
+    rest = moved - A * SymmetricSolver(A.transpose() * WA).Solve(WA.transpose() * moved);
     const Eigen::VectorXd lengths = rest.rowwise().norm();
     std::vector<double> sorted(lengths.data(), lengths.data() + n);
     const double limit = kHuber * MedianInPlace(&sorted);

@@ -4,17 +4,12 @@
 
 namespace camgyro {
 
-// Unit diagonal before the factorisation: the units differ by orders of magnitude.
-Yardstick::Yardstick(const Eigen::MatrixXd& covariance)
-    : scale_(covariance.diagonal().cwiseSqrt().cwiseInverse()),
-      correlation_(scale_.asDiagonal() * covariance * scale_.asDiagonal()) {}
+Yardstick::Yardstick(const Eigen::MatrixXd& covariance) : covariance_(covariance) {}
 
 double Yardstick::Distance(const Calibration& a, const Calibration& b) const {
-  Eigen::VectorXd d(scale_.size());
-  d.head<kStateSize>() = Difference(a, b);
-  d.tail(d.size() - kStateSize) = a.effect_values - b.effect_values;
-  d = scale_.cwiseProduct(d);
-  return std::sqrt(std::abs(d.dot(correlation_.solve(d))));
+  Eigen::VectorXd d(kStateSize + a.effect_values.size());
+  d << Difference(a, b), a.effect_values - b.effect_values;
+  return std::sqrt(std::abs(d.dot(covariance_.Solve(d).col(0))));
 }
 
 bool FrameTimesHaveSettled(const std::vector<FrameOffset>& known,

@@ -2,13 +2,13 @@
 #ifndef CAMGYRO_ESTIMATOR_WINDOW_YARDSTICK_H_
 #define CAMGYRO_ESTIMATOR_WINDOW_YARDSTICK_H_
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <vector>
 
 #include "core/calibration.h"
+#include "core/linear_algebra.h"
 #include "estimator/window/frame_times.h"
 
 namespace camgyro {
@@ -26,8 +26,7 @@ class Yardstick {
   double Distance(const Calibration& a, const Calibration& b) const;
 
  private:
-  Eigen::VectorXd scale_;
-  Eigen::LDLT<Eigen::MatrixXd> correlation_;
+  SymmetricSolver covariance_;
 };
 
 // Whether nine tenths of the frames' own times [s], by frame, have moved by less than kSettledStep

@@ -1,6 +1,6 @@
 #include "tools/comparison/information_bound.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -64,14 +64,6 @@ MatrixXd Explained(const MatrixXd& cross, const Eigen::Matrix2d& information) {
   return result;
 }
 
-// Inverts a positive definite matrix whose units differ by orders of magnitude.
-MatrixXd ScaledInverse(const MatrixXd& m) {
-  const VectorXd scale = m.diagonal().cwiseSqrt().cwiseInverse();
-  const MatrixXd unit = scale.asDiagonal() * m * scale.asDiagonal();
-  const MatrixXd inverse = unit.llt().solve(MatrixXd::Identity(m.rows(), m.cols()));
-  return scale.asDiagonal() * inverse * scale.asDiagonal();
-}
-
 class Accumulator {
  public:
   Accumulator(const Calibration& truth, const StateVector& prior_sigma, double gyro_sigma)
@@ -92,7 +84,7 @@ class Accumulator {
       const MatrixXd leaving = information_.block(kStateSize, kStateSize, cut, cut);
       const MatrixXd cross = information_(stay, Eigen::seqN(kStateSize, cut));
       const MatrixXd kept = information_(stay, stay);
-      information_ = kept - cross * leaving.llt().solve(MatrixXd(cross.transpose()));
+      information_ = kept - cross * SymmetricSolver(leaving).Solve(cross.transpose());
       information_ = MatrixXd(0.5 * (information_ + information_.transpose()));
       count_ -= drop;
       first_ += drop;
@@ -146,7 +138,7 @@ class Accumulator {
   }
 
   StateCovariance Bound() const {
-    return ScaledInverse(information_).topLeftCorner<kStateSize, kStateSize>();
+    return SymmetricSolver(information_).Inverse().topLeftCorner<kStateSize, kStateSize>();
   }
 
  private:
