@@ -131,6 +131,12 @@ void Read(YamlSection section, TrackOptions* tracks) {
   section.Finish();
 }
 
+void Read(YamlSection section, AttitudeOptions* attitudes) {
+  section.Read("noise_rad", &attitudes->noise_rad, Range::kNotNegative);
+  section.Read("walk_rad", &attitudes->walk_rad, Range::kNotNegative);
+  section.Finish();
+}
+
 void Read(YamlSection section, VideoOptions* video) {
   section.Read(
       "format", &video->format,
@@ -167,6 +173,13 @@ std::string CheckTogether(const Scenario& scenario) {
   if (scenario.video.format != VideoFormat::kNone && scenario.scene.kind == SceneKind::kPoints) {
     return "video.format: points have no surface to show; set scene.kind to ground, room, "
            "corridor, facade or mountains";
+  }
+  const bool attitudes = scenario.attitudes.wanted();
+  if (attitudes && scenario.video.format != VideoFormat::kNone) {
+    return "attitudes: are in the place of pictures; leave video.format out";
+  }
+  if (!attitudes && scenario.effects.attitude_rolling_shutter.active()) {
+    return "attitudes.noise_rad: or walk_rad is missing for attitude_rolling_shutter";
   }
   if (scenario.video.max_blur_samples < 4 || scenario.video.max_blur_samples > 64) {
     return "video.max_blur_samples: must lie between 4 and 64";
@@ -325,6 +338,7 @@ Result<Scenario> ParseScenario(const std::string& yaml, const std::vector<std::s
     Read(file.Child("mount"), &scenario.mount);
     Read(file.Child("gyro"), &scenario.gyro);
     Read(file.Child("tracks"), &scenario.tracks);
+    Read(file.Child("attitudes"), &scenario.attitudes);
     Read(file.Child("video"), &scenario.video);
     Read(file.Child("effects"), &scenario.effects);
     Read(file.Child("log"), &scenario.log_files);

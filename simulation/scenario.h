@@ -123,6 +123,14 @@ struct TrackOptions {
   double mean_life_frames = 0.0;  // 0: until it leaves the picture
 };
 
+// Attitudes of the camera instead of image motion, as an app or structure from motion delivers
+// them: of a frame's first row, which is all that there is of its readout. Both zero: none.
+struct AttitudeOptions {
+  double noise_rad = 0.0;  // of each attitude, per axis
+  double walk_rad = 0.0;   // of the rotation from one to the next, per axis: errors add up
+  bool wanted() const { return noise_rad > 0.0 || walk_rad > 0.0; }
+};
+
 enum class VideoFormat { kNone, kPng, kMp4 };
 struct VideoOptions {
   VideoFormat format = VideoFormat::kNone;  // kNone: tracks only
@@ -144,6 +152,7 @@ struct Scenario {
   MountOptions mount;
   GyroOptions gyro;
   TrackOptions tracks;
+  AttitudeOptions attitudes;
   VideoOptions video;
   Effects effects;
   // A device's own log. With one, the camera turns as its gyro did (the translation is that of

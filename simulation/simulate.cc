@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/so3.h"
 #include "core/time.h"
 #include "simulation/gyro.h"
 
@@ -21,7 +22,8 @@ enum Stream : uint32_t {
   kFrameStream,
   kTrackStream,
   kWanderStream,
-  kNoiseStream
+  kNoiseStream,
+  kAttitudeStream
 };
 
 std::mt19937_64 MakeRandom(uint64_t seed, Stream stream) {
@@ -327,6 +329,7 @@ Calibration Truth(const Scenario& scenario) {
     truth.distortion_model = distorted ? DistortionModel::kRadTan : DistortionModel::kNone;
   }
   truth.readout_s = effects.readout_direction.reversed ? -camera.readout_s : camera.readout_s;
+  if (scenario.attitudes.wanted()) truth.readout_s = 0.0;
   truth.delay_s = camera.delay_s;
   truth.bias_gyro_rad_s = scenario.gyro.bias_rad_s;
   truth.q_gyro_cam = scenario.mount.q_gyro_cam;
@@ -353,6 +356,26 @@ void AddLensShift(const Scenario& scenario, Simulated* result) {
   }
 }
 
+// Of each frame's first row, with an error of its own about the camera's axes, and one that adds up
+// about the world's.
+void AddAttitudes(const Scenario& scenario, Simulated* result) {
+  std::mt19937_64 random = MakeRandom(scenario.seed, kAttitudeStream);
+  std::normal_distribution<double> normal;
+  const auto draw = [&](double sigma) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Vector3d(sigma * Vector3d(x, y, z));
+  };
+  Eigen::Quaterniond walk = Eigen::Quaterniond::Identity();
+  for (const FrameTruth& frame : result->frames) {
+    const Vector3d error =
+        draw(scenario.attitudes.noise_rad) +
+        scenario.effects.attitude_rolling_shutter.Error(frame.state.omega_cam_rad_s);
+    const Eigen::Quaterniond q_world_cam(frame.state.R_world_cam);
+    result->recording.q_cam_world.push_back((walk * q_world_cam * Exp(error)).conjugate());
+    walk = walk * Exp(draw(scenario.attitudes.walk_rad));
+  }
+}
+
 }  // namespace
 
 Result<Simulated> SimulateSensors(const Scenario& scenario) {
@@ -367,6 +390,7 @@ Result<Simulated> SimulateSensors(const Scenario& scenario) {
   SimulatedGyro sensors = SimulateGyro(scenario, **trajectory, &random);
   AddFrames(scenario, sensors, &result);
   AddLensShift(scenario, &result);
+  if (scenario.attitudes.wanted()) AddAttitudes(scenario, &result);
   if (Status inside = CheckInside(result, scenario.scene); !inside) {
     return tl::unexpected(inside.error());
   }
@@ -401,6 +425,7 @@ void ForEachFrame(const Scenario& scenario, const Simulated& sensors,
 Result<Simulated> SimulateTracks(const Scenario& scenario) {
   Result<Simulated> result = SimulateSensors(scenario);
   if (!result) return result;
+  if (scenario.attitudes.wanted()) return result;
   ForEachFrame(
       scenario, *result,
       [&](size_t /*frame*/, std::vector<TrackedPoint>* tracks, std::vector<PointTruth>* truths) {

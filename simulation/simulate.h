@@ -47,7 +47,8 @@ struct Simulated {
   std::vector<std::vector<PointTruth>> points;  // as Recording::tracks
 };
 
-// Frames, gyro, accelerometer and the resolution; no image motion.
+// Frames, gyro, accelerometer, the resolution, and attitudes where the scenario has such; no image
+// motion.
 Result<Simulated> SimulateSensors(const Scenario& scenario);
 
 // The tracks of the frames of SimulateSensors, in turn, without keeping any: for streams of hours.
@@ -56,7 +57,8 @@ void ForEachFrame(
     const Scenario& scenario, const Simulated& sensors,
     const std::function<void(size_t, std::vector<TrackedPoint>*, std::vector<PointTruth>*)>& visit);
 
-// The sensors with tracks. Re-anchored tracks set MatchNoise::kSecondImage.
+// The sensors with tracks, unless the scenario has attitudes. Re-anchored tracks set
+// MatchNoise::kSecondImage.
 // Errors: the trajectory file; a camera that leaves the room.
 Result<Simulated> SimulateTracks(const Scenario& scenario);
 

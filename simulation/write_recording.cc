@@ -73,6 +73,17 @@ Status WriteTracks(const Simulated& s, const Scenario& scenario, const fs::path&
   return file.Close();
 }
 
+Status WriteAttitudes(const Simulated& s, const fs::path& path) {
+  TextFile file(path);
+  file.Print("#timestamp [ns],q_cam_world_w,q_cam_world_x,q_cam_world_y,q_cam_world_z\n");
+  for (size_t i = 0; i < s.recording.q_cam_world.size(); ++i) {
+    const Eigen::Quaterniond& q = s.recording.q_cam_world[i];
+    file.Print("%lld,%.12f,%.12f,%.12f,%.12f\n", Stamp(s.recording.frames[i].stamp_ns), q.w(),
+               q.x(), q.y(), q.z());
+  }
+  return file.Close();
+}
+
 Status WriteFrames(const Simulated& s, const Scenario& scenario, const fs::path& cam) {
   std::vector<Frame> frames = s.recording.frames;
   for (Frame& frame : frames) {
@@ -135,7 +146,10 @@ Status WriteTruth(const Simulated& s, const Scenario& scenario, const fs::path& 
       file.Print("      - {name: %s, unit: %s, value: %.9g}\n", p.name, p.unit, p.value);
     }
   });
-  if (scenario.video.format == VideoFormat::kNone) {
+  if (scenario.attitudes.wanted()) {
+    file.Print("noise_rad: %.9g\nwalk_rad: %.9g\n", scenario.attitudes.noise_rad,
+               scenario.attitudes.walk_rad);
+  } else if (scenario.video.format == VideoFormat::kNone) {
     file.Print("noise_px: %.9g\n", scenario.tracks.noise_px);
   }
   file.Print("seed: %llu\n", static_cast<unsigned long long>(scenario.seed));
@@ -220,11 +234,12 @@ Status WritePictures(const Simulated& s, const Scenario& scenario, const fs::pat
 // Pictures or tracks of another recording in the folder would be taken for this one's.
 Status CheckFolder(const Scenario& scenario, bool has_lens_shift, const fs::path& cam) {
   const VideoFormat format = scenario.video.format;
+  const bool attitudes = scenario.attitudes.wanted();
   for (const auto& [name, ours] :
-       {std::pair("tracks.csv", format == VideoFormat::kNone),
+       {std::pair("tracks.csv", format == VideoFormat::kNone && !attitudes),
         std::pair("video.mp4", format == VideoFormat::kMp4),
         std::pair("data", format == VideoFormat::kPng), std::pair("matches.csv", false),
-        std::pair("attitude.csv", false), std::pair("lens_shift.csv", has_lens_shift)}) {
+        std::pair("attitude.csv", attitudes), std::pair("lens_shift.csv", has_lens_shift)}) {
     if (ours || !fs::exists(cam / name)) continue;
     return BadInput((cam / name).string() +
                     ": belongs to another recording; expected a new or empty folder");
@@ -246,7 +261,9 @@ Status WriteRecording(const Simulated& simulated, const Scenario& scenario,
     fs::create_directories(root / "cam0");
     fs::create_directories(root / "imu0");
     Status status = WriteFrames(simulated, scenario, root / "cam0");
-    if (status && scenario.video.format == VideoFormat::kNone) {
+    if (status && scenario.attitudes.wanted()) {
+      status = WriteAttitudes(simulated, root / "cam0/attitude.csv");
+    } else if (status && scenario.video.format == VideoFormat::kNone) {
       status = WriteTracks(simulated, scenario, root / "cam0/tracks.csv");
     }
     if (status && !simulated.recording.lens_shift.empty()) {

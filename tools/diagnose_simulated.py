@@ -33,6 +33,8 @@ from calibration_errors import errors
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # They end in a refusal or in words, not in parameters that a fit could be given.
 NOT_FITTED = ("electronic_stabilisation", "gyro_saturation", "readout_direction")
+# Their scenarios have what no other effect's has.
+ALONE = ("translation_acceleration", "attitude_rolling_shutter")
 # A walk turns with less than 1 rad/s, so that nothing saturates.
 ABSENT = (("gyro_saturation", "walking"),)
 MOTIONS = ("walking", "running")
@@ -195,7 +197,7 @@ def effect_cases(options):
 
 def pair_cases(options):
     scenarios = [s for s in sorted(glob.glob(SOURCE + "/tools/scenarios/effect_*.yaml"))
-                 if name_of(s) not in NOT_FITTED + ("translation_acceleration",)
+                 if name_of(s) not in NOT_FITTED + ALONE
                  and name_of(s) == effect_of(s)]
     pairs = list(itertools.combinations(scenarios, 2))
     random.Random(1).shuffle(pairs)

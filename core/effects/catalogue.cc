@@ -31,6 +31,7 @@ const std::vector<EffectEntry>& EffectCatalogue() {
                                                      ExposureLowpassEntry(),
                                                      ExposureDelayEntry(),
                                                      TranslationAccelerationEntry(),
+                                                     AttitudeRollingShutterEntry(),
                                                      ElectronicStabilisationEntry()};
   return catalogue;
 }

@@ -27,6 +27,7 @@ EffectEntry GyroGSensitivityEntry();
 EffectEntry ExposureLowpassEntry();
 EffectEntry ExposureDelayEntry();
 EffectEntry TranslationAccelerationEntry();
+EffectEntry AttitudeRollingShutterEntry();
 EffectEntry ElectronicStabilisationEntry();
 
 }  // namespace camgyro

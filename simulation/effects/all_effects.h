@@ -5,6 +5,7 @@
 #define CAMGYRO_SIMULATION_EFFECTS_ALL_EFFECTS_H_
 
 #include "simulation/effects/aspect_ratio.h"
+#include "simulation/effects/attitude_rolling_shutter.h"
 #include "simulation/effects/bias_drift.h"
 #include "simulation/effects/clock_skew.h"
 #include "simulation/effects/delay_step.h"
@@ -51,6 +52,7 @@ struct Effects {
   ExposureLowpass exposure_lowpass;
   ExposureDelay exposure_delay;
   TranslationAcceleration translation_acceleration;
+  AttitudeRollingShutter attitude_rolling_shutter;
   ElectronicStabilisation electronic_stabilisation;
 
   // Calls visit(effect) for each, in the catalogue's order.
@@ -87,6 +89,7 @@ struct Effects {
     visit(self.exposure_lowpass);
     visit(self.exposure_delay);
     visit(self.translation_acceleration);
+    visit(self.attitude_rolling_shutter);
     visit(self.electronic_stabilisation);
   }
 };

@@ -69,6 +69,11 @@ TEST(Scenario, WrongValuesAreNamed) {
   EXPECT_THAT(ComplaintOf("video: {format: mp4}"), HasSubstr("no surface"));
   EXPECT_THAT(ComplaintOf("motion: {kind: file}"), HasSubstr("motion.file"));
   EXPECT_THAT(ComplaintOf("effects: {readout_nonlinear: {curve: 0.3}}"), HasSubstr("0.25"));
+  EXPECT_THAT(ComplaintOf("effects: {attitude_rolling_shutter: {roll_by_yaw_s: 0.01}}"),
+              HasSubstr("walk_rad is missing"));
+  EXPECT_THAT(ComplaintOf("attitudes: {noise_rad: 0.001}\nscene: {kind: room}\n"
+                          "video: {format: mp4}"),
+              HasSubstr("leave video.format out"));
   EXPECT_THAT(ComplaintOf("camera: {"), HasSubstr("line "));
 }
 

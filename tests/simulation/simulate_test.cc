@@ -336,5 +336,53 @@ TEST(Tracks, SameSeedSameRecordingOtherSeedAnother) {
   EXPECT_NE(a.recording.gyro[9].omega_gyro_rad_s, c.recording.gyro[9].omega_gyro_rad_s);
 }
 
+// Turned by an error of the camera's own axes: noise, and what the effect makes of the rate.
+TEST(Attitudes, AreTheCamerasWithNoise) {
+  Scenario scenario;
+  scenario.duration_s = 60.0;
+  scenario.attitudes.noise_rad = 0.002;
+  for (const bool with_effect : {false, true}) {
+    if (with_effect) scenario.effects.attitude_rolling_shutter = {-0.008, 0.006};
+    const Simulated s = SimulateTracks(scenario).value();
+    EXPECT_TRUE(s.recording.HasOnlyAttitudes());
+    EXPECT_EQ(s.truth.readout_s, 0.0);
+    ASSERT_EQ(s.recording.q_cam_world.size(), s.frames.size());
+    Vector3d squares = Vector3d::Zero();
+    for (size_t i = 0; i < s.frames.size(); ++i) {
+      const CameraState& state = s.frames[i].state;
+      const Eigen::Quaterniond q_world_cam(state.R_world_cam);
+      Vector3d error = Log((s.recording.q_cam_world[i] * q_world_cam).conjugate());
+      if (with_effect) {
+        error -=
+            Vector3d(0.0, 0.006 * state.omega_cam_rad_s.z(), -0.008 * state.omega_cam_rad_s.y());
+      }
+      squares += error.cwiseAbs2() / static_cast<double>(s.frames.size());
+    }
+    // The standard deviation of a variance of 1801 numbers is a thirtieth of it.
+    EXPECT_LT((squares / 4e-6 - Vector3d::Ones()).cwiseAbs().maxCoeff(), 0.1);
+  }
+}
+
+// What adds up: from one to the next as much as was asked for, and after n frames sqrt(n) of it.
+TEST(Attitudes, MayWalkAway) {
+  Scenario scenario;
+  scenario.duration_s = 60.0;
+  scenario.attitudes.walk_rad = 0.001;
+  const Simulated s = SimulateTracks(scenario).value();
+  std::vector<Eigen::Quaterniond> error;
+  for (size_t i = 0; i < s.frames.size(); ++i) {
+    const Eigen::Quaterniond q_world_cam(s.frames[i].state.R_world_cam);
+    error.push_back((q_world_cam * s.recording.q_cam_world[i]).conjugate());
+  }
+  double squares = 0.0;
+  for (size_t i = 1; i < error.size(); ++i) {
+    squares += Log(error[i - 1].conjugate() * error[i]).squaredNorm();
+  }
+  EXPECT_NEAR(squares / (3.0 * static_cast<double>(error.size() - 1)), 1e-6, 1e-7);
+  const double far = Log(error.front().conjugate() * error.back()).norm();
+  EXPECT_GT(far, 0.01);  // sqrt(3 * 1800) mrad is 0.07
+  EXPECT_LT(far, 0.2);
+}
+
 }  // namespace
 }  // namespace camgyro::simulation

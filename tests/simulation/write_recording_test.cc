@@ -98,6 +98,20 @@ TEST_F(WriteRecordingTest, ReadsBackAsItWas) {
   }
 }
 
+TEST_F(WriteRecordingTest, AttitudesReadBackAsTheyWere) {
+  const Scenario scenario = ParseScenario("duration_s: 1\nattitudes: {noise_rad: 0.001}").value();
+  const Simulated s = SimulateTracks(scenario).value();
+  ASSERT_TRUE(WriteRecording(s, scenario, Folder("out")));
+  const Result<Recording> read = ReadRecording(Folder("out"));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_TRUE(read->HasOnlyAttitudes());
+  ASSERT_EQ(read->q_cam_world.size(), s.recording.q_cam_world.size());
+  for (size_t i = 0; i < s.recording.q_cam_world.size(); ++i) {
+    EXPECT_LT(read->q_cam_world[i].angularDistance(s.recording.q_cam_world[i]), 1e-10);
+  }
+  EXPECT_THAT(Content(Folder("out") + "/truth.yaml"), HasSubstr("noise_rad: 0.001"));
+}
+
 TEST_F(WriteRecordingTest, TruthNamesParametersAndEffects) {
   const Scenario scenario = ParseScenario(kTracks).value();
   ASSERT_TRUE(WriteRecording(SimulateTracks(scenario).value(), scenario, Folder("out")));
