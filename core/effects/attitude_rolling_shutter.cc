@@ -4,7 +4,7 @@
 // While the camera turns by omega, a row v below the middle has turned on by omega k v, k the time
 // between rows one focal length apart. Structure from motion, whose pose knows one time, takes that
 // field for a rotation and a translation. Of yaw omega_y it makes the shear u = -k v omega_y, of
-// which a share a <v^2> / (<u^2> + <v^2>) is roll, whatever the depths; and roll omega_z it shows
+// which the share <v^2> / (<u^2> + <v^2>) is roll, whatever the depths; and roll omega_z it shows
 // as yaw, of the other sign and about as much where the scene is a wall, whose yaw and sideways
 // translation look alike, and not at all where depths are scattered. Pitch stretches the picture,
 // which is no rotation. (Least squares of all six: docs/lab/attitudes.md.)
@@ -17,7 +17,7 @@ namespace {
 
 // The attitude is turned by e: about the camera's z by roll_by_yaw omega_y, and about its y by
 // yaw_by_roll omega_z. So it turns by e' + omega x e faster than the camera, which is what the gyro
-// reads. (Without the second part the bias was 7.7 sigmas off in 40 s of running.)
+// reads. (The second part looks like a bias: docs/lab/attitudes.md.)
 class AttitudeRollingShutter final : public Effect {
  public:
   explicit AttitudeRollingShutter(const EffectSetup& setup)

@@ -35,7 +35,7 @@ double YawBetween(const Quaterniond& a, const Quaterniond& b) {
 }
 
 // The shortest rotation that turns this gravity down the world's z; about any level axis where it
-// points up. (Quaternion::FromTwoVectors is an SVD, which takes GCC 8 s to compile.)
+// points up. (Quaternion::FromTwoVectors is an SVD, whose templates take GCC long.)
 Quaterniond ShortestToLevel(const Vector3d& gravity) {
   const Vector3d from = gravity.normalized(), down = -Vector3d::UnitZ();
   const Vector3d middle = from + down;
