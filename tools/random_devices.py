@@ -3,16 +3,18 @@
 class usually show and declared by nobody, and prints how the errors compare with sigma_total:
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
-                            [--motions NAME,...] [--clean] [--strange] [--rendered] [--diagnose]
-                            [--effects LIST] [--stream PREPARE_VIO] [--jobs N] [--camgyro PATH]
-                            [KEY=VALUE ...]
+                            [--motions NAME,...] [--clean] [--strange] [--rendered] [--attitudes]
+                            [--diagnose] [--effects LIST] [--stream PREPARE_VIO] [--jobs N]
+                            [--camgyro PATH] [KEY=VALUE ...]
 
 The sizes are those of the class in core/effects/device_class.cc, read from that file. --clean draws
 nothing: for how often a doubt is said of a device that has no effect. --strange also draws how each
 was recorded: motion, length, rates, size of the picture, mounting, stamps of arrival, samples and
 frames that are missing, wrong, few and short-lived tracks, and things that move. --rendered: video
-of a scene, light and compression that are drawn instead of tracks. --diagnose: what `diagnose`
-makes of the devices, instead of `calibrate`, and what it names. --effects: to be fitted as well.
+of a scene, light and compression that are drawn instead of tracks. --attitudes: attitudes with
+errors that add up from frame to frame instead of tracks, made from rows of a rolling shutter, and
+a gyro of 100 Hz; what needs pixels is not determined then. --diagnose: what `diagnose` makes of the
+devices, instead of `calibrate`, and what it names. --effects: to be fitted as well.
 --stream: what the library's Calibrator makes of them, frame by frame, with that program
 (examples/recording); of phones only. KEY=VALUE changes the scenario of all recordings, as in
 `camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the errors within
@@ -79,6 +81,17 @@ def drawn_effects(device, seed):
               "delay_s": float(random.uniform(-0.1, 0.1)),
               "exposure_s": 0.02}  # of every frame, as in dim light
     return {"camera": camera, "effects": effects}
+
+
+def drawn_attitudes(device, seed, scenario):
+    """Changes a scenario to one of attitudes, which do not model the camera's rolling shutter."""
+    size = usual_sizes(device)["attitude_rolling_shutter"]
+    scenario["attitudes"] = {"walk_rad": 8e-4}
+    scenario["gyro"] = {"rate_hz": 100}
+    if "effects" in scenario:
+        roll_by_yaw, yaw_by_roll = size * np.random.default_rng([seed, 3]).standard_normal(2)
+        scenario["effects"]["attitude_rolling_shutter"] = {
+            "roll_by_yaw_s": float(roll_by_yaw), "yaw_by_roll_s": float(yaw_by_roll)}
 
 
 def drawn_conditions(seed, scenario):
@@ -186,6 +199,8 @@ def run(options, seed):
         motion = drawn_conditions(seed, scenario)
     if options.rendered:
         motion += ", " + drawn_pictures(seed, scenario)
+    if options.attitudes:
+        drawn_attitudes(options.device, seed, scenario)
     with tempfile.TemporaryDirectory() as folder:
         recording, out = folder + "/recording", folder + "/out"
         with open(folder + "/scenario.yaml", "w", encoding="utf-8") as file:
@@ -265,6 +280,7 @@ def main():
     parser.add_argument("--clean", action="store_true")
     parser.add_argument("--strange", action="store_true")
     parser.add_argument("--rendered", action="store_true")
+    parser.add_argument("--attitudes", action="store_true")
     parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--effects", metavar="LIST")
     parser.add_argument("--stream", metavar="PREPARE_VIO")
@@ -274,6 +290,8 @@ def main():
     options = parser.parse_args()
     if options.stream and (options.diagnose or options.device != "phone"):
         parser.error("--stream: of phones, without --diagnose")
+    if options.attitudes and (options.strange or options.rendered or options.stream):
+        parser.error("--attitudes: not with --strange, --rendered or --stream")
     if options.effects and options.stream:
         parser.error("--effects: not with --stream")
     options.motions = options.motions.split(",")
@@ -290,7 +308,8 @@ def main():
     print("%d of %d devices of class %s%s%s calibrated; a doubt of the model in %d, of the halves in "
           "%d" % (len(results), len(seeds), options.device, ", clean" if options.clean else "",
                   (", strangely recorded" if options.strange else "")
-                  + (", rendered" if options.rendered else ""),
+                  + (", rendered" if options.rendered else "")
+                  + (", attitudes" if options.attitudes else ""),
                   *np.sum([r["doubts"] for r in results], axis=0)))
     if options.diagnose:
         named = Counter(name for r in results for name in r["named"])
@@ -317,7 +336,11 @@ def main():
         if options.clean:  # has none of what the total allows for
             beyond(r["name"], np.where(r["determined"], r["error"] / r["noise"], 0.0), 4,
                    "sigma of noise")
-    nees = [r["error"] @ np.linalg.solve(r["total"], r["error"]) / len(NAMES) for r in results]
+    nees = []
+    for r in results:
+        has = np.isfinite(r["error"])  # attitudes have no lens
+        nees.append(r["error"][has] @ np.linalg.solve(r["total"][np.ix_(has, has)], r["error"][has])
+                    / has.sum())
     print("NEES per parameter with the total covariance: mean %.2f, median %.2f" % (
         np.mean(nees), np.median(nees)))
 

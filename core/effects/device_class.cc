@@ -74,6 +74,11 @@ const std::vector<UsualEffect>& UsualEffects() {
        "diagonal",
        {2e-4, 2e-4, 3e-5},
        "linear acceleration effect in data sheets: MPU-6050 0.1 deg/s per g, ADIS16445 0.015"},
+      {"attitude_rolling_shutter",
+       "rows",
+       {0.01, 0.006, 0.002},
+       "what a readout of 23, 14 and 5 ms leaves in attitudes that do not model it: 0.44 of it "
+       "(docs/lab/attitudes.md)"},
   };
   return effects;
 }

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "estimator/diagnosis/diagnose.h"
+#include "estimator/diagnosis/model_check.h"
 #include "simulation/simulate.h"
 
 namespace camgyro {
@@ -51,6 +52,28 @@ TEST(DiagnoseAttitudes, NamesThoseOfARollingShutter) {
   EXPECT_NEAR(found.effect_values[1], 0.003, 3.0 * sigma[1]);
   EXPECT_LT(sigma.maxCoeff(), 3e-4);
   EXPECT_LT(InSigmas(found, simulated->truth).cwiseAbs().maxCoeff(), 3.0);
+}
+
+// While running, it looks like a bias about y, which the total of a usual device allows for.
+TEST(CalibrateAttitudes, TheTotalKnowsTheirRollingShutter) {
+  const auto scenario = simulation::ParseScenario(
+      "duration_s: 20\nmotion: {kind: running}\ngyro: {rate_hz: 100}\n"
+      "attitudes: {walk_rad: 8e-4}\n"
+      "effects: {attitude_rolling_shutter: {roll_by_yaw_s: -0.01, yaw_by_roll_s: 0.01}}",
+      {});
+  ASSERT_TRUE(scenario) << scenario.error().message;
+  const auto simulated = simulation::SimulateTracks(*scenario, 5);
+  ASSERT_TRUE(simulated) << simulated.error().message;
+  Result<CalibrationReport> report = CalibrateRecording(simulated->recording, nullptr, {});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_TRUE(CheckModel(simulated->recording, {}, DeviceClass::kPhone, &*report).has_value());
+  const Calibration& found = report->calibration;
+  ASSERT_TRUE(found.sigma_total().has_value());
+  const StateVector error = Difference(found, simulated->truth);
+  constexpr int kBiasY = kStateBias + 1;
+  EXPECT_GT(std::abs(error[kBiasY]), 4.0 * found.sigma()[kBiasY]);
+  const Errors in_total = error.cwiseQuotient(*found.sigma_total()).tail<7>();
+  EXPECT_LT(in_total.cwiseAbs().maxCoeff(), 3.0) << in_total.transpose();
 }
 
 }  // namespace
