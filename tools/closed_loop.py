@@ -74,6 +74,8 @@ def row(result):
         return [result["name"], str(result["exit"]), "", "", "", "", result["error"][0]]
     verdict = d["verdict"]
     said = []
+    if verdict.get("unconfirmed"):
+        said.append("not confirmed: " + ", ".join(verdict["unconfirmed"]))
     if verdict["unexplained_structure"]:
         said.append("structure is left: " + ", ".join(verdict["where"]))
     said += ["%s: %s" % (f["name"], f["finding"]) for f in d["faults"]]

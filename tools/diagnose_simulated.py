@@ -139,6 +139,7 @@ def run(options, case):
             verdict, rounds = diagnosis["verdict"], diagnosis["rounds"]
             result["tested"] = bool(rounds)
             result["unexplained"] = verdict["unexplained_structure"]
+            result["unconfirmed"] = verdict["unconfirmed"]
             if rounds:
                 # after correction for the number of candidates
                 result["least_p"] = min(1.0, len(rounds[0]["candidates"]) * min(
@@ -268,6 +269,7 @@ def write_effects(out, results):
               "times those of the informed one in %d. Within 3σ are %s of the effects' parameters."
               "\n\n" % (sum(map(is_right, results)), len(results), sum(map(is_right, large)),
                         len(large), len(worse), within(results)))
+    write_confirmed(out, results)
     for motion in MOTIONS:
         informed = [r["error_informed"] for r in results
                     if r["motion"] == motion and "error_informed" in r]
@@ -275,6 +277,17 @@ def write_effects(out, results):
             out.write("Squared errors of the informed calibrations, in sigmas, have a mean of %.2f "
                       "in %d recordings of %s (honest sigmas: 1).\n" % (
                           np.mean(informed), len(informed), motion))
+    out.write("\n")
+
+
+def write_confirmed(out, results):
+    """Of runs whose verdict says what frames that had no part in it do not confirm."""
+    of = [r for r in results if "unconfirmed" in r and r["tested"]]
+    for kind, right in (("right", True), ("wrong", False)):
+        names = [(n, r) for r in of for n in r["added"] if (n in r["effects"]) == right]
+        not_confirmed = sum(n in r["unconfirmed"] for n, r in names)
+        out.write("Of %d effects that were named and are %s, the frames of the report share do not "
+                  "confirm %d.\n" % (len(names), kind, not_confirmed))
     out.write("\n")
 
 

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/format.h"
+#include "estimator/diagnosis/gain_rule.h"
 #include "tools/report/parameter_rows.h"
 
 namespace camgyro {
@@ -75,21 +76,6 @@ void EmitRound(YAML::Emitter& out, const DiagnosisRound& round) {
   out << YAML::EndMap;
 }
 
-std::string ValueText(const CandidateResult& c) {
-  std::string text;
-  for (Eigen::Index k = 0; k < c.estimate.size() && k < 4; ++k) {
-    if (k >= c.sigma.size()) break;
-    const EffectParameter& p = c.parameter_info[static_cast<size_t>(k)];
-    const ReadableUnit unit = ReadableUnitOf(p.unit);
-    text +=
-        Format("%s%s %.4g ± %.2g%s", k > 0 ? ", " : "", p.name.c_str(), unit.scale * c.estimate[k],
-               unit.scale * c.sigma[k], unit.name.empty() ? "" : (" " + unit.name).c_str());
-  }
-  if (c.estimate.size() > 4)
-    text += Format(", and %d more", static_cast<int>(c.estimate.size()) - 4);
-  return text;
-}
-
 std::string RoundText(size_t number, const DiagnosisRound& round, const char* unit, double scale) {
   std::string text;
   if (round.added.empty()) return Format("%zu. ", number) + NothingAddedText(round) + "\n";
@@ -97,7 +83,7 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
   text = Format("%zu. %s%s: %s\n", number, c.name.c_str(),
                 c.shape == "constant" ? "" : (" (" + c.shape + ")").c_str(),
                 FindEffect(c.name)->explanation.c_str());
-  if (c.estimate.size() > 0) text += "     " + ValueText(c) + "\n";
+  if (c.estimate.size() > 0) text += "     " + ValuesText(c) + "\n";
   text += c.tried_anyway
               ? "     how sure: without it the model is so far off that its score says nothing"
               : Format("     how sure: p = %.2g", c.p_value);
@@ -111,9 +97,10 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
   text += "\n";
   text += Format(
       "     unseen frames: rms %.*f -> %.*f %s, chi2/dof %.3f -> %.3f, chi2 falls by "
-      "%.0f ± %.0f\n",
+      "%.0f ± %.0f%s\n",
       3, scale * round.before.rms_px, 3, scale * round.after.rms_px, unit, round.before.chi2,
-      round.after.chi2, round.report_gain.sum, round.report_gain.sigma);
+      round.after.chi2, round.report_gain.sum, round.report_gain.sigma,
+      Confirmed(round) ? "" : ": they do not confirm it");
   std::string shifts;
   for (int i = 0; i < kStateSize; ++i) {
     if (std::abs(round.shift_sigmas[i]) >= 2.0) {
@@ -140,6 +127,21 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
 std::string Joined(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string ValuesText(const CandidateResult& c) {
+  std::string text;
+  for (Eigen::Index k = 0; k < c.estimate.size() && k < 4; ++k) {
+    if (k >= c.sigma.size()) break;
+    const EffectParameter& p = c.parameter_info[static_cast<size_t>(k)];
+    const ReadableUnit unit = ReadableUnitOf(p.unit);
+    text +=
+        Format("%s%s %.4g ± %.2g%s", k > 0 ? ", " : "", p.name.c_str(), unit.scale * c.estimate[k],
+               unit.scale * c.sigma[k], unit.name.empty() ? "" : (" " + unit.name).c_str());
+  }
+  if (c.estimate.size() > 4)
+    text += Format(", and %d more", static_cast<int>(c.estimate.size()) - 4);
   return text;
 }
 
@@ -173,6 +175,7 @@ std::string DiagnosisYaml(const Diagnosis& d) {
   }
   out << YAML::EndSeq << YAML::Key << "verdict" << YAML::Value << YAML::BeginMap;
   out << YAML::Key << "effects" << YAML::Value << YAML::Flow << d.effects;
+  out << YAML::Key << "unconfirmed" << YAML::Value << YAML::Flow << Unconfirmed(d.rounds);
   Emit(out, "unexplained_structure", d.unexplained_structure);
   out << YAML::Key << "where" << YAML::Value << YAML::Flow << d.where;
   out << YAML::Key << "indistinguishable" << YAML::Value << YAML::Flow << YAML::BeginSeq;
@@ -250,6 +253,8 @@ std::string DiagnosisText(const Diagnosis& d, bool attitudes) {
   }
   text += "verdict    ";
   text += d.effects.empty() ? "no effect beyond " + NameOfModel(d) : Joined(d.effects);
+  const std::vector<std::string> unconfirmed = Unconfirmed(d.rounds);
+  if (!unconfirmed.empty()) text += "; not confirmed by unseen frames: " + Joined(unconfirmed);
   if (d.unexplained_structure) {
     text += "; structure is left that nothing in the catalogue explains: " + Joined(d.where);
   }

@@ -12,6 +12,10 @@ namespace camgyro {
 // Names, with commas between them.
 std::string Joined(const std::vector<std::string>& words);
 
+// What was estimated of a candidate, in readable units: "x 0.014 ± 0.0068, ..."; four values at
+// most.
+std::string ValuesText(const CandidateResult& candidate);
+
 // diagnosis.yaml (docs/result_format.md).
 std::string DiagnosisYaml(const Diagnosis& diagnosis);
 

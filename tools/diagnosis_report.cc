@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/format.h"
+#include "estimator/diagnosis/gain_rule.h"
 #include "tools/diagnosis_file.h"
 #include "tools/report/calibrate_report.h"
 #include "tools/report/charts.h"
@@ -28,6 +29,11 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
       Paragraph(d.effects.empty() ? "No effect beyond " + NameOfModel(d) + " was found."
                                   : "Found: " + Joined(d.effects) + ".");
   if (!d.not_tested.empty()) html += Paragraph("Nothing was tested: " + d.not_tested + ".");
+  const std::vector<std::string> unconfirmed = Unconfirmed(d.rounds);
+  if (!unconfirmed.empty()) {
+    html += Paragraph("Not confirmed by frames that neither fit nor choice has seen: " +
+                      Joined(unconfirmed) + ".");
+  }
   if (d.unexplained_structure) html += Paragraph(StructureText(d) + ".");
   std::vector<std::string> faults;
   for (const DataFault& fault : d.faults) {
@@ -53,17 +59,9 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
       continue;
     }
     const CandidateResult& c = round.candidates.front();
-    std::string parameters;
-    for (Eigen::Index k = 0; k < std::min<Eigen::Index>(4, c.estimate.size()); ++k) {
-      if (k >= c.sigma.size()) break;
-      const EffectParameter& p = c.parameter_info[static_cast<size_t>(k)];
-      const ReadableUnit unit = ReadableUnitOf(p.unit);
-      parameters += Format("%s%s %.4g ± %.2g %s", k > 0 ? "; " : "", p.name.c_str(),
-                           unit.scale * c.estimate[k], unit.scale * c.sigma[k], unit.name.c_str());
-    }
     rounds.rows.push_back(
         Row({Format("%zu", i + 1),
-             c.name + " (" + c.shape + "): " + FindEffect(c.name)->explanation, parameters,
+             c.name + " (" + c.shape + "): " + FindEffect(c.name)->explanation, ValuesText(c),
              c.tried_anyway ? "without it, the model is far off" : Format("%.2g", c.p_value),
              Format("%.3f → %.3f", scale * round.before.rms_px, scale * round.after.rms_px),
              Format("%.3f → %.3f", round.before.chi2, round.after.chi2),

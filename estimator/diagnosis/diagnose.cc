@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/format.h"
 #include "core/free_memory.h"
 #include "core/usual_focal.h"
 #include "estimator/astray.h"
+#include "estimator/diagnosis/gain_rule.h"
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
 #include "estimator/times_between.h"
@@ -110,6 +112,19 @@ void CalibrateWith(const Calibration& found, const LoopInput& input,
   }
 }
 
+// The result has them all the same: what chose them has four times the frames.
+void DoubtWhatIsNotConfirmed(Diagnosis* diagnosis) {
+  if (!diagnosis->after) return;
+  for (const DiagnosisRound& round : diagnosis->rounds) {
+    if (round.added.empty() || Confirmed(round)) continue;
+    diagnosis->after->doubts.push_back(
+        round.added +
+        Format(" is not confirmed by frames that neither fit nor choice has seen (chi2 falls by "
+               "%.0f ± %.0f): it may stand for something else, and pull other parameters with it",
+               round.report_gain.sum, round.report_gain.sigma));
+  }
+}
+
 // Of the plain fit, where it is the result: the times of frames in between take as long as a fit,
 // and one with effects finds them anew.
 void AddTimesBetween(const Recording& recording, const DiagnoseOptions& options,
@@ -171,6 +186,7 @@ Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOpti
   AddReversedReadout(&diagnosis);
   if (found->effects && found->effects != report.calibration.effects) {
     CalibrateWith(*found, input, rotations_at, options, progress, &diagnosis);
+    DoubtWhatIsNotConfirmed(&diagnosis);
     clock.Finish("refinement with effects");
   }
   return diagnosis;

@@ -31,4 +31,16 @@ bool GainBearsOut(const CandidateResult& candidate, double tests) {
          gain.sigma < kGainSigmas * expected.sigma;
 }
 
+bool Confirmed(const DiagnosisRound& round) {
+  return round.report_gain.sum > kConfirmingSigmas * round.report_gain.sigma;
+}
+
+std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds) {
+  std::vector<std::string> names;
+  for (const DiagnosisRound& round : rounds) {
+    if (!round.added.empty() && !Confirmed(round)) names.push_back(round.added);
+  }
+  return names;
+}
+
 }  // namespace camgyro

@@ -1,6 +1,10 @@
 // Does the gain in unseen frames bear out an effect that is significant?
+// And do frames that had no part in the choice confirm it?
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_GAIN_RULE_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_GAIN_RULE_H_
+
+#include <string>
+#include <vector>
 
 #include "estimator/diagnosis/diagnose.h"
 
@@ -18,6 +22,14 @@ namespace camgyro {
 // Without any doubt, once its scatter is enough.
 // tests: number of candidates of the round.
 bool GainBearsOut(const CandidateResult& candidate, double tests);
+
+// Does the report share gain by what the round has added, beyond that gain's own noise? If it does
+// not, the effect may be right and too weak to show in a fifth of the recording, or stand for
+// something else, which the other frames have and these have not.
+bool Confirmed(const DiagnosisRound& round);
+
+// Effects that were added and are not confirmed, in their order.
+std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds);
 
 }  // namespace camgyro
 

@@ -34,5 +34,23 @@ TEST(DiagnosisText, SaysWhySomethingSignificantIsNotNamed) {
   EXPECT_THAT(text, Not(HasSubstr("nothing more is significant")));
 }
 
+TEST(DiagnosisText, SaysWhatUnseenFramesDoNotConfirm) {
+  DiagnosisRound round;
+  round.candidates = {Candidate("gyro_scale", 1e-9, "")};
+  round.added = "gyro_scale";
+  round.report_gain.sum = -1.0;
+  round.report_gain.sigma = 10.0;
+  Diagnosis diagnosis;
+  diagnosis.effects = {"gyro_scale"};
+  diagnosis.rounds = {round};
+  constexpr char kSays[] = "verdict    gyro_scale; not confirmed by unseen frames: gyro_scale\n";
+  EXPECT_THAT(DiagnosisText(diagnosis, true),
+              testing::AllOf(HasSubstr(kSays), HasSubstr("-1 ± 10: they do not confirm it\n")));
+  EXPECT_THAT(DiagnosisYaml(diagnosis), HasSubstr("unconfirmed: [gyro_scale]"));
+  diagnosis.rounds[0].report_gain.sum = 11.0;
+  EXPECT_THAT(DiagnosisText(diagnosis, true), HasSubstr("verdict    gyro_scale\n"));
+  EXPECT_THAT(DiagnosisYaml(diagnosis), HasSubstr("unconfirmed: []"));
+}
+
 }  // namespace
 }  // namespace camgyro

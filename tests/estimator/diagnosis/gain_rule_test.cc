@@ -53,5 +53,20 @@ TEST(GainRule, TheScatterOfAnEffectOfFewBlocksIsTheEffect) {
   EXPECT_FALSE(GainBearsOut(step, kTests));
 }
 
+// What the report share gains has no part in the choice; it confirms what was added, or does not.
+TEST(GainRule, AnEffectIsConfirmedByAGainBeyondItsNoise) {
+  const auto round = [](const std::string& added, double gain, double sigma) {
+    DiagnosisRound r;
+    r.added = added;
+    r.report_gain.sum = gain;
+    r.report_gain.sigma = sigma;
+    return r;
+  };
+  EXPECT_TRUE(Confirmed(round("gyro_scale", 33.0, 23.0)));
+  EXPECT_THAT(Unconfirmed({round("clock_skew", 70.0, 35.0), round("gyro_scale", 9.0, 10.0),
+                           round("delay_wander", -14.0, 5.0), round("", 0.0, 0.0)}),
+              testing::ElementsAre("gyro_scale", "delay_wander"));
+}
+
 }  // namespace
 }  // namespace camgyro
