@@ -255,12 +255,14 @@ class Refinement {
   }
 
   bool SameNoise(const Noise& other) const {
+    const double settled = options_.settled_scale;
     double changes_sq = 0.0;
     for (size_t i = 0; i < ids_.size(); ++i) {
-      changes_sq += std::pow(std::log(other.factors[i] / noise_now_.factors[i]), 2);
+      const double change = std::abs(std::log(other.factors[i] / noise_now_.factors[i]));
+      changes_sq += std::pow(std::min(change, 3.0 * settled), 2);
     }
-    return std::abs(other.scale / noise_now_.scale - 1.0) < options_.settled_scale &&
-           changes_sq < std::pow(options_.settled_scale, 2) * static_cast<double>(ids_.size());
+    return std::abs(other.scale / noise_now_.scale - 1.0) < settled &&
+           changes_sq < settled * settled * static_cast<double>(ids_.size());
   }
 
   void SetNoise(const Noise& noise) {

@@ -32,7 +32,9 @@ struct RefinementOptions {
   double settled_round = 0.3;
   // The scale of the noise, the pairs' factors (root mean square) and the spread of the frames'
   // times have settled when a round has changed them by less than this share. Of that size is the
-  // error of all sigmas.
+  // error of all sigmas. A factor that changes by more than three times this counts as if it were
+  // three times: where the model misfits, some pairs turn from one direction to another and back
+  // with the noise that each of the two leaves, for ever, and tell nothing of the others.
   double settled_scale = 0.03;
   double cluster_s = 2.0;  // stretches of the clustered covariance
   // What pairs share is held (graph.hold_shared), and the frames' own times are what is asked for:

@@ -236,6 +236,20 @@ TEST(Refinement, NoiseAlongTheMotionIsNoBiasIfItIsKnown) {
   EXPECT_GT(ErrorInSigmas(alike->calibration, s.truth).cwiseAbs().maxCoeff(), 5.0);
 }
 
+// A clock that runs fast, which the model has not: some pairs turn to and fro between two
+// directions and the noise that each leaves, and do not keep the others from settling.
+TEST(Refinement, SettlesAlthoughSomePairsTurnToAndFro) {
+  Scenario scenario = ShortScenario(40.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRunning);
+  scenario.effects.clock_skew.ppm = 400.0;
+  const Simulated s = SimulateTracks(scenario).value();
+  const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  const Result<Refined> refined = RefineFromOffTheTruth(s, input);
+  ASSERT_TRUE(refined.has_value()) << refined.error().message;
+  EXPECT_TRUE(refined->converged);
+  EXPECT_LT(refined->rounds, RefinementOptions().max_rounds);
+}
+
 // Steps in a room, at walking pace: they turn the path in phase with the rotation, so that a prior
 // which takes a part of the turn away puts it into the readout time.
 TEST(Refinement, StepsThatTurnThePathAreNoBias) {
