@@ -15,6 +15,8 @@
 namespace camgyro {
 namespace {
 
+constexpr char kAnotherExplainsMore[] = "another explains more";
+
 struct Rival {
   size_t at;  // index into the contestants
   Refined fit;
@@ -47,12 +49,14 @@ class Contest {
   std::optional<ContestResult> Run() {
     if (ran_away_) RefitWhatLeadsAstray();
     if (rivals_.empty()) {
-      for (size_t next = 0; next < all_.size();) RefitTogether(NextTogether(&next));
+      size_t next = 0;
+      RefitTogether(NextTogether(kFirstRivals, &next));
+      while (next < all_.size()) RefitTogether(NextTogether(all_.size(), &next));
     }
     if (rivals_.empty()) return std::nullopt;
     const size_t winner = Winner();
     for (size_t i = 0; i < rivals_.size(); ++i) {
-      if (i != winner) all_[rivals_[i].at].result.rejected = "another explains more";
+      if (i != winner) all_[rivals_[i].at].result.rejected = kAnotherExplainsMore;
     }
     return ContestResult{rivals_[winner].at, std::move(rivals_[winner].fit)};
   }
@@ -110,11 +114,11 @@ class Contest {
     }
   }
 
-  // Contestants from *next on that are refitted whatever comes of those before them here: with
-  // each, there is at most one rival more. *next becomes the first of the others.
-  std::vector<size_t> NextTogether(size_t* next) {
+  // Contestants from *next on, at most so many, that are refitted whatever comes of those before
+  // them here: with each, there is at most one rival more. *next becomes the first of the others.
+  std::vector<size_t> NextTogether(size_t at_most, size_t* next) {
     std::vector<size_t> together;
-    for (; *next < all_.size(); ++*next) {
+    for (; *next < all_.size() && together.size() < at_most; ++*next) {
       if (all_[*next].candidate.is_last_resort()) continue;
       if (what_led_astray_is_refitted_ && all_[*next].candidate.entry->leads_astray) continue;
       CandidateResult& r = all_[*next].result;
@@ -161,6 +165,17 @@ class Contest {
     return Rival{i, *fit, LatentGain(choice_)};
   }
 
+  // Beyond, a refit is given up: it has more noise than the fit without it, or so much more than
+  // one of the rivals that it cannot gain as much.
+  double MostNoise() const {
+    double least = noise_;
+    for (const Rival& rival : rivals_) {
+      if (all_[rival.at].candidate.widens_prior()) continue;  // numbers of its own in every pair
+      least = std::min(least, rival.fit.quality.noise_px);
+    }
+    return kMostNoiseOfRival * least;
+  }
+
   // The better of a fit from the present one and, where the model is astray, one from the start.
   // With what sends fits away, the end of one that ran away is nowhere to begin from.
   Result<Refined> FitWith(const CandidateResult& r, const Candidate& candidate) const {
@@ -171,9 +186,10 @@ class Contest {
     start.delay_s += r.start_delay_change_s;
     Calibration anew = fits_.in().start;
     AddEffect(candidate, &anew);
-    const auto from_start = [&] { return fits_.Fit(anew, fits_.in().noise, nullptr, most_noise_); };
+    const double most_noise = MostNoise();
+    const auto from_start = [&] { return fits_.Fit(anew, fits_.in().noise, nullptr, most_noise); };
     if (ran_away_ && candidate.entry->leads_astray) return from_start();
-    Result<Refined> fit = fits_.Fit(start, noise_, nullptr, most_noise_);
+    Result<Refined> fit = fits_.Fit(start, noise_, nullptr, most_noise);
     if (!astray_) return fit;
     const Result<Refined> other = from_start();
     const auto rank = [&](const Refined& f) {
@@ -187,13 +203,14 @@ class Contest {
   std::optional<Rival> RefitRival(size_t i) {
     auto& [r, candidate] = all_[i];
     Result<Refined> fit = FitWith(r, candidate);
-    if (fit && fit->quality.noise_px > most_noise_) {
-      r.rejected = "with it, the fit leads nowhere";
+    if (fit && fit->quality.noise_px > MostNoise()) {
+      const bool by_itself = fit->quality.noise_px > most_noise_;
+      r.rejected = by_itself ? "with it, the fit leads nowhere" : kAnotherExplainsMore;
       return std::nullopt;
     }
     if (fit && candidate.entry->step_at && fits_.PlaceSteps(noise_, &fit->calibration)) {
       r.shape = fit->calibration.effects->items().back().shape;
-      fit = fits_.Fit(fit->calibration, noise_, fit->latents, most_noise_);
+      fit = fits_.Fit(fit->calibration, noise_, fit->latents, MostNoise());
     }
     if (!fit) {
       r.rejected = "the fit with it failed: " + fit.error().message;

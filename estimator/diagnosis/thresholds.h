@@ -76,6 +76,10 @@ constexpr double kLeastGainOfRival = 0.25;
 // settle are at 1.03 of it at most, steps of the delay that are none at 2.4 and more (by prints
 // that are not in the program; Contest.GivesUpARivalThatLeadsNowhere).
 constexpr double kMostNoiseOfRival = 1.5;
+// So many, those of the largest gains, are refitted before the others, whose noise is then held
+// against theirs: one misfit often has two names or shapes (clock_skew and delay_wander, two series
+// of a lens), and most machines two cores.
+constexpr size_t kFirstRivals = 2;
 // A linear gain of one effect over chi2, beyond which the model is so far off that it says little
 // (FindEffects.ChoosesTheSeriesOfAWideLens).
 constexpr double kStrongMisfit = 0.02;

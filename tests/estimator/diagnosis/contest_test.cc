@@ -61,6 +61,45 @@ TEST(Contest, GivesUpARivalThatLeadsNowhere) {
   EXPECT_EQ(all.front().result.rejected, "no gain on unseen frames beyond its noise");
 }
 
+// A clock that runs fast. Once two rivals that say so are fitted, one that leaves the noise where
+// it was is given up.
+TEST(Contest, GivesUpARivalWithFarMoreNoiseThanAnother) {
+  simulation::Scenario scenario = ShortScenario(12.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRunning);
+  scenario.effects.clock_skew.ppm = 1500.0;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const LoopInput in = InputOf(s);
+  const DiagnoseOptions options;
+  const SharedFits fits(in, options);
+  const Result<Refined> now = fits.Fit(in.fit, in.noise);
+  ASSERT_TRUE(now) << now.error().message;
+
+  const EffectSetup setup = MakeEffectSetup(s.recording, now->calibration);
+  std::vector<Contestant> all;
+  for (const char* name : {"clock_skew", "delay_wander", "gyro_scale"}) {
+    const EffectEntry* entry = FindEffect(name);
+    const std::string shape = entry->shapes(setup).back();
+    Contestant rival;
+    rival.candidate = {entry, shape, entry->make(setup, shape), 0};
+    rival.result.name = name;
+    rival.result.gain.sum = 100.0 - static_cast<double>(all.size());
+    all.push_back(rival);
+  }
+  const Scores choice =
+      fits.ScoresOf(fits.shares().choice, now->calibration, nullptr, now->quality.noise_px);
+  ContestSetting setting;
+  setting.fits = &fits;
+  setting.now = &*now;
+  setting.choice = &choice;
+  setting.first_round = false;
+  const std::optional<ContestResult> contest = RunContest(setting, &all);
+  ASSERT_TRUE(contest);
+  EXPECT_EQ(all[contest->winner].result.name, "clock_skew");
+  EXPECT_TRUE(all[1].result.refitted);
+  EXPECT_FALSE(all[2].result.refitted);
+  EXPECT_EQ(all[2].result.rejected, "another explains more");
+}
+
 // What sends fits away is asked before anything else where a fit has run away, and fitted from the
 // start; the rest is asked again when the fit is back.
 TEST(Contest, BringsBackAFitThatRanAway) {
