@@ -64,6 +64,7 @@ void EmitRound(YAML::Emitter& out, const DiagnosisRound& round) {
   out << YAML::Key << "unseen_gain" << YAML::Value << YAML::Flow << YAML::BeginMap;
   Emit(out, "value", round.report_gain.sum);
   Emit(out, "sigma", round.report_gain.sigma);
+  if (!round.added.empty()) Emit(out, "expected", round.expected_gain);
   Emit(out, "residuals", round.before.residuals);
   out << YAML::EndMap;
   if (!round.added.empty()) {
@@ -97,10 +98,15 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
   text += "\n";
   text += Format(
       "     unseen frames: rms %.*f -> %.*f %s, chi2/dof %.3f -> %.3f, chi2 falls by "
-      "%.0f ± %.0f%s\n",
+      "%.0f ± %.0f",
       3, scale * round.before.rms_px, 3, scale * round.after.rms_px, unit, round.before.chi2,
-      round.after.chi2, round.report_gain.sum, round.report_gain.sigma,
-      Confirmed(round) ? "" : ": they do not confirm it");
+      round.after.chi2, round.report_gain.sum, round.report_gain.sigma);
+  if (IsUnconfirmed(round)) {
+    text += Format(", %.0f expected: they do not confirm it", round.expected_gain);
+  } else if (!CouldConfirm(round)) {
+    text += " (they are too few to say more)";
+  }
+  text += "\n";
   std::string shifts;
   for (int i = 0; i < kStateSize; ++i) {
     if (std::abs(round.shift_sigmas[i]) >= 2.0) {

@@ -116,12 +116,13 @@ void CalibrateWith(const Calibration& found, const LoopInput& input,
 void DoubtWhatIsNotConfirmed(Diagnosis* diagnosis) {
   if (!diagnosis->after) return;
   for (const DiagnosisRound& round : diagnosis->rounds) {
-    if (round.added.empty() || Confirmed(round)) continue;
+    if (!IsUnconfirmed(round)) continue;
     diagnosis->after->doubts.push_back(
         round.added +
         Format(" is not confirmed by frames that neither fit nor choice has seen (chi2 falls by "
-               "%.0f ± %.0f): it may stand for something else, and pull other parameters with it",
-               round.report_gain.sum, round.report_gain.sigma));
+               "%.0f ± %.0f, %.0f expected): it may stand for something else, and pull other "
+               "parameters with it",
+               round.report_gain.sum, round.report_gain.sigma, round.expected_gain));
   }
 }
 

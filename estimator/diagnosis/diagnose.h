@@ -64,6 +64,7 @@ struct DiagnosisRound {
   std::string added, shape;                        // empty: nothing
   ReportShare before, after;                       // alike if nothing was added
   Gain report_gain;                                // fall of chi2 in the report share
+  double expected_gain = 0.0;                      // there, if the fit with the effect is right
   StateVector shift_sigmas = StateVector::Zero();  // of each parameter, in its sigmas before
 };
 

@@ -358,6 +358,7 @@ class Loop {
     result->before = Summarise(before, noise);
     result->after = Summarise(after, noise);
     result->report_gain = SumOf(Fall(before, after));
+    result->expected_gain = ExpectedFall(after, was, is);
     fit_ = contest.fit;
     for (auto& [r, candidate] : *all) {
       if (&r != &chosen && candidate.is_last_resort() && r.rejected.empty()) {

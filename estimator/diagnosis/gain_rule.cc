@@ -31,14 +31,34 @@ bool GainBearsOut(const CandidateResult& candidate, double tests) {
          gain.sigma < kGainSigmas * expected.sigma;
 }
 
-bool Confirmed(const DiagnosisRound& round) {
-  return round.report_gain.sum > kConfirmingSigmas * round.report_gain.sigma;
+double ExpectedFall(const Scores& scores, const Calibration& without, const Calibration& with) {
+  const Eigen::Index had = without.effect_values.size(), has = with.effect_values.size();
+  if (has < had || scores.num_model != kStateSize + has) return 0.0;
+  Eigen::VectorXd moved(scores.num_model);
+  moved.head<kStateSize>() = Difference(with, without);
+  moved.tail(has) = with.effect_values;
+  moved.segment(kStateSize, had) -= without.effect_values;
+  double fall = 0.0;
+  for (const BlockScore& block : scores.blocks) {
+    if (block.H.rows() < moved.size()) continue;
+    fall += moved.dot(block.H.topLeftCorner(moved.size(), moved.size()) * moved);
+  }
+  return fall;
+}
+
+bool CouldConfirm(const DiagnosisRound& round) {
+  return round.expected_gain > kGainSigmas * 2.0 * std::sqrt(round.expected_gain);
+}
+
+bool IsUnconfirmed(const DiagnosisRound& round) {
+  return !round.added.empty() && CouldConfirm(round) &&
+         round.report_gain.sum <= kConfirmingSigmas * round.report_gain.sigma;
 }
 
 std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds) {
   std::vector<std::string> names;
   for (const DiagnosisRound& round : rounds) {
-    if (!round.added.empty() && !Confirmed(round)) names.push_back(round.added);
+    if (IsUnconfirmed(round)) names.push_back(round.added);
   }
   return names;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/diagnose.h"
+#include "estimator/diagnosis/pair_scores.h"
 
 namespace camgyro {
 
@@ -23,12 +24,21 @@ namespace camgyro {
 // tests: number of candidates of the round.
 bool GainBearsOut(const CandidateResult& candidate, double tests);
 
-// Does the report share gain by what the round has added, beyond that gain's own noise? If it does
-// not, the effect may be right and too weak to show in a fifth of the recording, or stand for
-// something else, which the other frames have and these have not.
-bool Confirmed(const DiagnosisRound& round);
+// Fall of chi2 in a share where `with` is right in place of `without`, from which it differs by an
+// effect more and what else has moved: the difference, squared by the information that the share
+// has. scores: of the share, at `with`.
+double ExpectedFall(const Scores& scores, const Calibration& without, const Calibration& with);
 
-// Effects that were added and are not confirmed, in their order.
+// Can the report share, which has no part in the choice, say anything of what the round has added?
+// Its tracks are its own, so that it may have few matches, and those tell little of weak effects: a
+// right one has to show beyond twice the noise of such a gain, 2 sqrt(gain).
+bool CouldConfirm(const DiagnosisRound& round);
+
+// It could, and gains nothing beyond the gain's own scatter: the effect may be right all the same,
+// or stand for something else, which the other frames have and these have not.
+bool IsUnconfirmed(const DiagnosisRound& round);
+
+// The effects of such rounds, in their order.
 std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds);
 
 }  // namespace camgyro

@@ -40,12 +40,14 @@ TEST(DiagnosisText, SaysWhatUnseenFramesDoNotConfirm) {
   round.added = "gyro_scale";
   round.report_gain.sum = -1.0;
   round.report_gain.sigma = 10.0;
+  round.expected_gain = 22.0;
   Diagnosis diagnosis;
   diagnosis.effects = {"gyro_scale"};
   diagnosis.rounds = {round};
   constexpr char kSays[] = "verdict    gyro_scale; not confirmed by unseen frames: gyro_scale\n";
   EXPECT_THAT(DiagnosisText(diagnosis, true),
-              testing::AllOf(HasSubstr(kSays), HasSubstr("-1 ± 10: they do not confirm it\n")));
+              testing::AllOf(HasSubstr(kSays),
+                             HasSubstr("-1 ± 10, 22 expected: they do not confirm it\n")));
   EXPECT_THAT(DiagnosisYaml(diagnosis), HasSubstr("unconfirmed: [gyro_scale]"));
   diagnosis.rounds[0].report_gain.sum = 11.0;
   EXPECT_THAT(DiagnosisText(diagnosis, true), HasSubstr("verdict    gyro_scale\n"));

@@ -53,19 +53,38 @@ TEST(GainRule, TheScatterOfAnEffectOfFewBlocksIsTheEffect) {
   EXPECT_FALSE(GainBearsOut(step, kTests));
 }
 
-// What the report share gains has no part in the choice; it confirms what was added, or does not.
-TEST(GainRule, AnEffectIsConfirmedByAGainBeyondItsNoise) {
-  const auto round = [](const std::string& added, double gain, double sigma) {
+// What the report share gains has no part in the choice. It contradicts only what it could show.
+TEST(GainRule, AnEffectThatGainsNothingWhereItWouldShowIsUnconfirmed) {
+  const auto round = [](const std::string& added, double gain, double sigma, double expected) {
     DiagnosisRound r;
     r.added = added;
     r.report_gain.sum = gain;
     r.report_gain.sigma = sigma;
+    r.expected_gain = expected;
     return r;
   };
-  EXPECT_TRUE(Confirmed(round("gyro_scale", 33.0, 23.0)));
-  EXPECT_THAT(Unconfirmed({round("clock_skew", 70.0, 35.0), round("gyro_scale", 9.0, 10.0),
-                           round("delay_wander", -14.0, 5.0), round("", 0.0, 0.0)}),
-              testing::ElementsAre("gyro_scale", "delay_wander"));
+  EXPECT_FALSE(IsUnconfirmed(round("gyro_scale", 33.0, 23.0, 40.0)));
+  EXPECT_FALSE(CouldConfirm(round("gyro_scale", 1.0, 2.0, 15.0)));
+  EXPECT_THAT(
+      Unconfirmed({round("clock_skew", 1.0, 2.0, 15.0), round("gyro_scale", 9.0, 10.0, 17.0),
+                   round("delay_wander", -14.0, 5.0, 40.0), round("", 0.0, 0.0, 0.0)}),
+      testing::ElementsAre("gyro_scale", "delay_wander"));
+}
+
+// 3 px of the focal length, and an effect of 0.02, by what two blocks know of both.
+TEST(GainRule, WhatAShareWouldGainFollowsFromItsInformation) {
+  Calibration without, with;
+  with.lens[kFocal] = without.lens[kFocal] + 3.0;
+  with.effect_values = Eigen::VectorXd::Constant(1, 0.02);
+  BlockScore block;
+  block.H = Eigen::MatrixXd::Zero(kStateSize + 1, kStateSize + 1);
+  block.H(kStateFocal, kStateFocal) = 2.0;
+  block.H(kStateSize, kStateSize) = 1e4;
+  block.H(kStateSize, kStateFocal) = block.H(kStateFocal, kStateSize) = -50.0;
+  Scores scores;
+  scores.num_model = kStateSize + 1;
+  scores.blocks = {block, block};
+  EXPECT_NEAR(ExpectedFall(scores, without, with), 2.0 * (18.0 + 4.0 - 6.0), 1e-9);
 }
 
 }  // namespace
