@@ -62,9 +62,9 @@ constexpr double kNoDoubt = 1e-5;       // p of all candidates together
 constexpr double kNoiseAlone = 2.0;     // inflation below which the noise is the model's
 constexpr double kGainSigmas = 2.0;     // beyond its scatter, or the noise of a right effect's gain
 constexpr double kHardlyAnyLoss = 0.1;  // of the gain, lost in the stretches that become worse
-// Beyond its scatter, the gain in the report share that confirms an effect. It chooses nothing, and
-// the share is half of that which chooses: twice would doubt many that are right
-// (docs/lab/diagnosis_simulated.md).
+// A gain in the report share of no more than so much of its scatter does not confirm an effect that
+// would show there. It chooses nothing, and the share is half of that which chooses: twice would
+// doubt many that are right (docs/lab/closed_loop.md has gains beside what was expected).
 constexpr double kConfirmingSigmas = 1.0;
 
 // ---- The contest of refitted rivals (contest.cc; docs/lab/diagnosis_simulated.md) ----
