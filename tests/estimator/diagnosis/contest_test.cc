@@ -21,6 +21,19 @@ LoopInput InputOf(const simulation::Simulated& s) {
   return in;
 }
 
+Scores ChoiceOf(const SharedFits& fits, const Refined& now) {
+  return fits.ScoresOf(fits.shares().choice, now.calibration, nullptr, now.quality.noise_px);
+}
+
+ContestSetting LaterRound(const SharedFits& fits, const Refined& now, const Scores& choice) {
+  ContestSetting setting;
+  setting.fits = &fits;
+  setting.now = &now;
+  setting.choice = &choice;
+  setting.first_round = false;
+  return setting;
+}
+
 // A step of the delay that is not in the data, and that begins far off: the fit with it ends where
 // its noise is a multiple of that without it, and is not followed there.
 TEST(Contest, GivesUpARivalThatLeadsNowhere) {
@@ -42,13 +55,8 @@ TEST(Contest, GivesUpARivalThatLeadsNowhere) {
   rival.result.start = Eigen::VectorXd::Constant(1, -0.3);
   rival.result.start_delay_change_s = 0.3;
   std::vector<Contestant> all = {rival};
-  const Scores choice =
-      fits.ScoresOf(fits.shares().choice, now->calibration, nullptr, now->quality.noise_px);
-  ContestSetting setting;
-  setting.fits = &fits;
-  setting.now = &*now;
-  setting.choice = &choice;
-  setting.first_round = false;
+  const Scores choice = ChoiceOf(fits, *now);
+  const ContestSetting setting = LaterRound(fits, *now, choice);
   EXPECT_FALSE(RunContest(setting, &all));
   EXPECT_EQ(all.front().result.rejected, "with it, the fit leads nowhere");
 
@@ -85,13 +93,8 @@ TEST(Contest, GivesUpARivalWithFarMoreNoiseThanAnother) {
     rival.result.gain.sum = 100.0 - static_cast<double>(all.size());
     all.push_back(rival);
   }
-  const Scores choice =
-      fits.ScoresOf(fits.shares().choice, now->calibration, nullptr, now->quality.noise_px);
-  ContestSetting setting;
-  setting.fits = &fits;
-  setting.now = &*now;
-  setting.choice = &choice;
-  setting.first_round = false;
+  const Scores choice = ChoiceOf(fits, *now);
+  const ContestSetting setting = LaterRound(fits, *now, choice);
   const std::optional<ContestResult> contest = RunContest(setting, &all);
   ASSERT_TRUE(contest);
   EXPECT_EQ(all[contest->winner].result.name, "clock_skew");
