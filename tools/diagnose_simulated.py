@@ -139,7 +139,7 @@ def run(options, case):
             verdict, rounds = diagnosis["verdict"], diagnosis["rounds"]
             result["tested"] = bool(rounds)
             result["unexplained"] = verdict["unexplained_structure"]
-            result["unconfirmed"] = verdict["unconfirmed"]
+            result["unconfirmed"] = verdict.get("unconfirmed", [])
             if rounds:
                 # after correction for the number of candidates
                 result["least_p"] = min(1.0, len(rounds[0]["candidates"]) * min(
