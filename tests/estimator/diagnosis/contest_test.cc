@@ -21,33 +21,39 @@ LoopInput InputOf(const simulation::Simulated& s) {
   return in;
 }
 
-Scores ChoiceOf(const SharedFits& fits, const Refined& now) {
-  return fits.ScoresOf(fits.shares().choice, now.calibration, nullptr, now.quality.noise_px);
-}
+// 12 s of a run, a gyro's clock that is so much too fast, and the fit without any effect, in a
+// round after the first.
+struct FittedRun {
+  explicit FittedRun(double skew_ppm) : s(Run(skew_ppm)) {
+    choice = fits.ScoresOf(fits.shares().choice, now->calibration, nullptr, now->quality.noise_px);
+    setting.fits = &fits;
+    setting.now = &*now;
+    setting.choice = &choice;
+    setting.first_round = false;
+  }
+  static simulation::Simulated Run(double skew_ppm) {
+    simulation::Scenario scenario = ShortScenario(12.0);
+    scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRunning);
+    scenario.effects.clock_skew.ppm = skew_ppm;
+    return simulation::SimulateTracks(scenario).value();
+  }
 
-ContestSetting LaterRound(const SharedFits& fits, const Refined& now, const Scores& choice) {
+  simulation::Simulated s;
+  LoopInput in = InputOf(s);
+  DiagnoseOptions options;
+  SharedFits fits{in, options};
+  Result<Refined> now = fits.Fit(in.fit, in.noise);
+  EffectSetup setup = MakeEffectSetup(s.recording, now->calibration);
+  Scores choice;
   ContestSetting setting;
-  setting.fits = &fits;
-  setting.now = &now;
-  setting.choice = &choice;
-  setting.first_round = false;
-  return setting;
-}
+};
 
 // A step of the delay that is not in the data, and that begins far off: the fit with it ends where
 // its noise is a multiple of that without it, and is not followed there.
 TEST(Contest, GivesUpARivalThatLeadsNowhere) {
-  simulation::Scenario scenario = ShortScenario(12.0);
-  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRunning);
-  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
-  const LoopInput in = InputOf(s);
-  const DiagnoseOptions options;
-  const SharedFits fits(in, options);
-  const Result<Refined> now = fits.Fit(in.fit, in.noise);
-  ASSERT_TRUE(now) << now.error().message;
-
+  const FittedRun run(0.0);
   const EffectEntry* entry = FindEffect("delay_step");
-  const ShapedEffect step = entry->step_at(MakeEffectSetup(s.recording, now->calibration), 6.0);
+  const ShapedEffect step = entry->step_at(run.setup, 6.0);
   Contestant rival;
   rival.candidate = {entry, step.shape, step.effect, 0};
   rival.result.name = "delay_step";
@@ -55,16 +61,14 @@ TEST(Contest, GivesUpARivalThatLeadsNowhere) {
   rival.result.start = Eigen::VectorXd::Constant(1, -0.3);
   rival.result.start_delay_change_s = 0.3;
   std::vector<Contestant> all = {rival};
-  const Scores choice = ChoiceOf(fits, *now);
-  const ContestSetting setting = LaterRound(fits, *now, choice);
-  EXPECT_FALSE(RunContest(setting, &all));
+  EXPECT_FALSE(RunContest(run.setting, &all));
   EXPECT_EQ(all.front().result.rejected, "with it, the fit leads nowhere");
 
   // From the start that is near, the same rival is followed to its end.
   all = {rival};
   all.front().result.start.setZero();
   all.front().result.start_delay_change_s = 0.0;
-  EXPECT_FALSE(RunContest(setting, &all));
+  EXPECT_FALSE(RunContest(run.setting, &all));
   EXPECT_TRUE(all.front().result.refitted);
   EXPECT_EQ(all.front().result.rejected, "no gain on unseen frames beyond its noise");
 }
@@ -72,30 +76,18 @@ TEST(Contest, GivesUpARivalThatLeadsNowhere) {
 // A clock that runs fast. Once two rivals that say so are fitted, one that leaves the noise where
 // it was is given up.
 TEST(Contest, GivesUpARivalWithFarMoreNoiseThanAnother) {
-  simulation::Scenario scenario = ShortScenario(12.0);
-  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRunning);
-  scenario.effects.clock_skew.ppm = 1500.0;
-  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
-  const LoopInput in = InputOf(s);
-  const DiagnoseOptions options;
-  const SharedFits fits(in, options);
-  const Result<Refined> now = fits.Fit(in.fit, in.noise);
-  ASSERT_TRUE(now) << now.error().message;
-
-  const EffectSetup setup = MakeEffectSetup(s.recording, now->calibration);
+  const FittedRun run(1500.0);
   std::vector<Contestant> all;
   for (const char* name : {"clock_skew", "delay_wander", "gyro_scale"}) {
     const EffectEntry* entry = FindEffect(name);
-    const std::string shape = entry->shapes(setup).back();
+    const std::string shape = entry->shapes(run.setup).back();
     Contestant rival;
-    rival.candidate = {entry, shape, entry->make(setup, shape), 0};
+    rival.candidate = {entry, shape, entry->make(run.setup, shape), 0};
     rival.result.name = name;
     rival.result.gain.sum = 100.0 - static_cast<double>(all.size());
     all.push_back(rival);
   }
-  const Scores choice = ChoiceOf(fits, *now);
-  const ContestSetting setting = LaterRound(fits, *now, choice);
-  const std::optional<ContestResult> contest = RunContest(setting, &all);
+  const std::optional<ContestResult> contest = RunContest(run.setting, &all);
   ASSERT_TRUE(contest);
   EXPECT_EQ(all[contest->winner].result.name, "clock_skew");
   EXPECT_TRUE(all[1].result.refitted);
