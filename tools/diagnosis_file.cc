@@ -77,6 +77,17 @@ void EmitRound(YAML::Emitter& out, const DiagnosisRound& round) {
   out << YAML::EndMap;
 }
 
+// By how much chi2 of unseen frames falls, and what that says of the effect.
+std::string UnseenGainText(const DiagnosisRound& round) {
+  std::string text = Format("%.0f ± %.0f", round.report_gain.sum, round.report_gain.sigma);
+  if (IsUnconfirmed(round)) {
+    text += Format(", %.0f expected: they do not confirm it", round.expected_gain);
+  } else if (!ShowsGain(round)) {
+    text += " (too little to tell)";
+  }
+  return text;
+}
+
 std::string RoundText(size_t number, const DiagnosisRound& round, const char* unit, double scale) {
   std::string text;
   if (round.added.empty()) return Format("%zu. ", number) + NothingAddedText(round) + "\n";
@@ -98,15 +109,9 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
   text += "\n";
   text += Format(
       "     unseen frames: rms %.*f -> %.*f %s, chi2/dof %.3f -> %.3f, chi2 falls by "
-      "%.0f ± %.0f",
+      "%s\n",
       3, scale * round.before.rms_px, 3, scale * round.after.rms_px, unit, round.before.chi2,
-      round.after.chi2, round.report_gain.sum, round.report_gain.sigma);
-  if (IsUnconfirmed(round)) {
-    text += Format(", %.0f expected: they do not confirm it", round.expected_gain);
-  } else if (!CouldConfirm(round)) {
-    text += " (they are too few to say more)";
-  }
-  text += "\n";
+      round.after.chi2, UnseenGainText(round).c_str());
   std::string shifts;
   for (int i = 0; i < kStateSize; ++i) {
     if (std::abs(round.shift_sigmas[i]) >= 2.0) {

@@ -50,9 +50,12 @@ bool CouldConfirm(const DiagnosisRound& round) {
   return round.expected_gain > kGainSigmas * 2.0 * std::sqrt(round.expected_gain);
 }
 
+bool ShowsGain(const DiagnosisRound& round) {
+  return round.report_gain.sum > kConfirmingSigmas * round.report_gain.sigma;
+}
+
 bool IsUnconfirmed(const DiagnosisRound& round) {
-  return !round.added.empty() && CouldConfirm(round) &&
-         round.report_gain.sum <= kConfirmingSigmas * round.report_gain.sigma;
+  return !round.added.empty() && CouldConfirm(round) && !ShowsGain(round);
 }
 
 std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds) {

@@ -34,7 +34,10 @@ double ExpectedFall(const Scores& scores, const Calibration& without, const Cali
 // right one has to show beyond twice the noise of such a gain, 2 sqrt(gain).
 bool CouldConfirm(const DiagnosisRound& round);
 
-// It could, and gains nothing beyond the gain's own scatter: the effect may be right all the same,
+// Does it gain beyond the gain's own scatter there?
+bool ShowsGain(const DiagnosisRound& round);
+
+// It could, and shows no gain: the effect may be right all the same,
 // or stand for something else, which the other frames have and these have not.
 bool IsUnconfirmed(const DiagnosisRound& round);
 

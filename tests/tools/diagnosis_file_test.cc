@@ -49,7 +49,10 @@ TEST(DiagnosisText, SaysWhatUnseenFramesDoNotConfirm) {
               testing::AllOf(HasSubstr(kSays),
                              HasSubstr("-1 ± 10, 22 expected: they do not confirm it\n")));
   EXPECT_THAT(DiagnosisYaml(diagnosis), HasSubstr("unconfirmed: [gyro_scale]"));
+  diagnosis.rounds[0].expected_gain = 3.0;
+  EXPECT_THAT(DiagnosisText(diagnosis, true), HasSubstr("-1 ± 10 (too little to tell)\n"));
   diagnosis.rounds[0].report_gain.sum = 11.0;
+  EXPECT_THAT(DiagnosisText(diagnosis, true), HasSubstr("chi2 falls by 11 ± 10\n"));
   EXPECT_THAT(DiagnosisText(diagnosis, true), HasSubstr("verdict    gyro_scale\n"));
   EXPECT_THAT(DiagnosisYaml(diagnosis), HasSubstr("unconfirmed: []"));
 }
