@@ -96,7 +96,6 @@ double NoiseOfSmoothMotion(const Recording& recording, const PairSelection& sele
 PairSelection SelectPairs(const Recording& recording, const GapLimits& limits) {
   // A little more than 0.1 s, so that 3 frames of a camera of 29.95 Hz are not too long.
   constexpr double kLongestS = 0.2, kLongestReanchoredS = 0.101;
-  constexpr int kLongest = 9;  // frames, where nothing is far
   PairSelection selection;
   if (!recording.matches.empty() || recording.tracks.empty()) return selection;
   const bool reanchored = recording.match_noise == MatchNoise::kSecondImage;
@@ -123,11 +122,11 @@ PairSelection SelectPairs(const Recording& recording, const GapLimits& limits) {
   };
   if (reanchored) {
     int gap = 2;
-    while (gap <= kLongest && take(gap, kLongestReanchoredS)) ++gap;
+    while (take(gap, kLongestReanchoredS)) ++gap;
     return selection;
   }
   int gap = 3;
-  while (gap <= kLongest && take(gap, kLongestS)) gap += 2;
+  while (take(gap, kLongestS)) gap += 2;
   if (selection.gap < 3) return selection;
   const double parallax = ParallaxPerFrame(recording, selection.gap);
   gap = selection.gap;

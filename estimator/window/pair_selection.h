@@ -45,7 +45,7 @@ constexpr GapLimits kGapLimitsOfPoorStart{std::numeric_limits<int>::max(), 100, 
 
 // The pairs to estimate from. Parallax and rotation grow with the gap and the noise of an
 // observation does not, so that neighbours tell least, and are biased where their parallax is as
-// small as the noise (docs/lab/benchmark.md). The gap is the longest up to 9 frames and 0.2 s that
+// small as the noise (docs/lab/benchmark.md). The gap is the longest up to 0.2 s that
 // keeps 60 % of the neighbours' matches and leaves enough pairs; where things are so far away, or
 // so equally far, that parallaxes differ by less than kLeastParallax there, the shortest gap at
 // which they do, or as long as the limits allow. No two pairs share noise: gaps are odd and pairs

@@ -56,6 +56,23 @@ TEST(SelectPairs, TakesLongGapsThatShareNoNoise) {
   EXPECT_EQ(SelectPairs(SimulateTracks(scenario)->recording).gap, 1);
 }
 
+// A gap is a time: at 240 frames/s nine frames would be 0.04 s, with a fifth of the parallax.
+TEST(SelectPairs, GapsOfFastCamerasTakeAsLong) {
+  for (const double rate_hz : {60.0, 240.0}) {
+    Scenario scenario = ShortScenario(4.0);
+    scenario.camera.rate_hz = rate_hz;
+    scenario.camera.readout_s = 0.004;
+    Recording recording = SimulateTracks(scenario)->recording;
+    const double gap_s = SelectPairs(recording).gap / rate_hz;
+    EXPECT_GT(gap_s, 0.16);
+    EXPECT_LE(gap_s, 0.2);
+    recording.match_noise = MatchNoise::kSecondImage;
+    const double of_chain_s =
+        SelectPairs(recording, {/*gap=*/48, /*least_pairs=*/20}).gap / rate_hz;
+    EXPECT_NEAR(of_chain_s, 0.1, 0.01);
+  }
+}
+
 // Far things, or all equally far: the gap has parallaxes that differ, or is as long as it may be.
 TEST(SelectPairs, TakesLongerGapsWhereThingsAreFar) {
   const Recording near = SimulateTracks(WithDepths(1.5, 20.0))->recording,
