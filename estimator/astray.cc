@@ -7,9 +7,10 @@
 
 #include "core/parallel.h"
 #include "core/standard_distortion.h"
+#include "estimator/residual_table.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/starting_point.h"
-#include "estimator/window/pair_selection.h"
+#include "estimator/window/smooth_motion.h"
 
 namespace camgyro {
 namespace {
@@ -59,9 +60,32 @@ bool LensFollowsTurns(const Calibration& calibration) {
                      [](const EffectSet::Item& item) { return item.effect->hides_turns(); });
 }
 
-double NoiseOverSmooth(const Recording& recording, double noise_px) {
-  if (recording.HasOnlyAttitudes() || !recording.matches.empty()) return 0.0;
-  return noise_px / NoiseOfSmoothMotion(recording, SelectPairs(recording));
+double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
+                       const Calibration& fit, double noise_px, const PairGraphOptions& options) {
+  constexpr size_t kPairs = 100;
+  if (recording.HasOnlyAttitudes() || !options.residual->facts().has_direction) return 0.0;
+  std::vector<TimedPair> pairs;
+  const size_t step = std::max<size_t>(1, input.pairs.size() / kPairs);
+  for (size_t k = 0; k < input.pairs.size(); k += step) pairs.push_back(input.pairs[k]);
+  AddMatches(recording, &pairs);
+  const std::vector<MatchResidual> rows = ComputeResiduals(input, pairs, fit, noise_px, options);
+  const Eigen::Vector2d size_px(fit.width_px, fit.height_px);
+  LeftOver sum;
+  for (auto begin = rows.begin(); begin != rows.end();) {
+    std::vector<Eigen::Vector2d> places_px, corrections_px;
+    auto row = begin;
+    for (; row != rows.end() && row->frame_a == begin->frame_a && row->frame_b == begin->frame_b;
+         ++row) {
+      places_px.push_back(row->match.px_b);
+      corrections_px.push_back(row->correction_px);
+    }
+    if (const auto of_pair = SeparateSmooth(places_px, corrections_px, size_px)) {
+      sum.all += of_pair->all;
+      sum.unsmooth += of_pair->unsmooth;
+    }
+    begin = row;
+  }
+  return sum.unsmooth > 0.0 ? std::sqrt(sum.all / sum.unsmooth) : 0.0;
 }
 
 void LookThroughFittedLens(const Recording& recording, const CalibrateOptions& options,
@@ -129,6 +153,7 @@ double UnseenRms(const CalibrationReport& fit) {
 
 std::optional<CalibrationReport> FitWithWhatLeadsAstray(
     const Recording& recording, const StartResult& start, const Calibration& from, double noise_px,
+    double over_smooth,
     const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with,
     const EffectEntry** added) {
   constexpr size_t kTogether = 2;  // whatever the number of threads: a fixed order of trials
@@ -152,8 +177,7 @@ std::optional<CalibrationReport> FitWithWhatLeadsAstray(
       }
       if (best && *added == &entry && best->quality.noise_px < enough_px) break;
     }
-    const double left_px = best ? best->quality.noise_px : noise_px;
-    if (NoiseOverSmooth(recording, left_px) <= kNoiseOfAstray) break;
+    if ((best ? best->noise_over_smooth : over_smooth) <= kNoiseOfAstray) break;
   }
   return best;
 }

@@ -11,6 +11,8 @@
 #include "core/recording.h"
 #include "estimator/calibrate.h"
 #include "estimator/start/find_start.h"
+#include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_graph_options.h"
 
 namespace camgyro {
 
@@ -28,17 +30,17 @@ bool IsRunningAway(double before_px, double now_px, double from_px);
 // factor.
 bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start);
 
-// A fit whose noise is more than so many times that of a smooth motion (NoiseOfSmoothMotion) lacks
-// something that bends the whole picture. Of a fit that lacks nothing it is 1 at most, but for
-// chance; with k1 = -0.28 that nobody declares, 1.18 px of 0.50 px in a pan
-// (CalibrateAstray.TakesInALensAfterTheFitOfAllPairs); with the logged lens of a stabilised Pixel,
-// 3.9 of 0.5 px, where f was 277 px and t_d 25 ms off (docs/lab/device_logs.md). Nothing of such a
-// fit is determined, whatever its sigmas.
+// A fit that leaves more than so many times what it would leave without what is a smooth function
+// of the place in the picture lacks something that bends the whole picture. Of a fit that lacks
+// nothing it is 1, but for chance. Nothing of such a fit is determined, whatever its sigmas.
 constexpr double kNoiseOfAstray = 1.5;
 
-// The noise of a fit over that of a smooth motion; 0 for recordings without tracks, which know no
-// motion of their own.
-double NoiseOverSmooth(const Recording& recording, double noise_px);
+// What a fit leaves (ComputeResiduals, of 100 pairs at most) over what it leaves without what is
+// smooth (SeparateSmooth), robust. 0 where nothing can be said: for recordings without pictures,
+// residuals without a direction of translation, and pairs with too few matches. The tracks' noise
+// is in both, whether it adds up from frame to frame or not.
+double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
+                       const Calibration& fit, double noise_px, const PairGraphOptions& options);
 
 // A lens that follows the camera's turns (optical_stabilisation) takes them out of the pictures.
 bool LensFollowsTurns(const Calibration& calibration);
@@ -70,12 +72,13 @@ bool IsBornOut(const CalibrationReport& fit, const std::string& effect, double b
 // The calibration with one of the effects that lead fits astray (EffectEntry::leads_astray) and
 // that the data bear out: of its shapes that the start does not rule out, and of several such
 // effects, with the one that fits unseen frames best; *added is that effect. from: where fits
-// begin; noise_px: of the fit without; fit_with: a fit with an effect, as --effects names it, which
-// is called from several threads. Two shapes are tried together, the usual ones first; if one of
-// them leaves a tenth of the variance, the others are not. The lens comes first, and where no more
-// than the noise of a smooth motion is left, nothing else is tried.
+// begin; noise_px, over_smooth: of the fit without, the latter as NoiseOverSmooth; fit_with: a fit
+// with an effect, as --effects names it, which is called from several threads. Two shapes are tried
+// together, the usual ones first; if one of them leaves a tenth of the variance, the others are
+// not. The lens comes first, and where nothing that is smooth is left, nothing else is tried.
 std::optional<CalibrationReport> FitWithWhatLeadsAstray(
     const Recording& recording, const StartResult& start, const Calibration& from, double noise_px,
+    double over_smooth,
     const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with,
     const EffectEntry** added);
 

@@ -40,7 +40,8 @@ class CalibrationJob {
       if (const Status done = Window(); !done) return tl::unexpected(done.error());
       // What a fit of all pairs makes of an online estimate that is astray would take minutes.
       if (online_noise_ && FocalIsAstray(estimate_)) {
-        if (auto better = TryWhatLeadsAstray(rotations_at, estimate_, *online_noise_)) {
+        if (auto better = TryWhatLeadsAstray(rotations_at, estimate_, *online_noise_,
+                                             OverSmooth(estimate_, *online_noise_))) {
           return *std::move(better);
         }
       }
@@ -52,8 +53,10 @@ class CalibrationJob {
       if (const Status done = Refinement(); !done) return tl::unexpected(done.error());
       LookThroughFittedLens(recording_, options_, rotations_at, &report_);
       const double noise = report_.quality.noise_px;
-      if (FocalIsAstray(report_.calibration) || NoiseIsAstray(noise)) {
-        if (auto better = TryWhatLeadsAstray(rotations_at, report_.calibration, noise)) {
+      report_.noise_over_smooth = OverSmooth(report_.calibration, noise);
+      if (FocalIsAstray(report_.calibration) || NoiseIsAstray()) {
+        if (auto better = TryWhatLeadsAstray(rotations_at, report_.calibration, noise,
+                                             report_.noise_over_smooth)) {
           return *std::move(better);
         }
       }
@@ -61,6 +64,7 @@ class CalibrationJob {
       report_.calibration = *report_.online;
       report_.quality.pairs = report_.pairs_used_online;
       report_.quality.noise_px = report_.trace.back().noise_px;
+      report_.noise_over_smooth = OverSmooth(report_.calibration, report_.quality.noise_px);
       report_.converged = true;
     }
     AddGyroClock(recording_, &report_.calibration);
@@ -68,13 +72,12 @@ class CalibrationJob {
     // Delay and bias come from rates; the rest needs a fit that has settled, at a lens like the
     // start's.
     const double focal_px = report_.calibration.lens[kFocal];
-    const bool pulled = NoiseOverSmooth(recording_, report_.quality.noise_px) > kNoiseOfAstray;
     const bool ran_away =
         !report_.calibration.determined[kStateFocal] && RanAway(focal_px, from_start_.lens[kFocal]);
     if (ran_away || !report_.converged || IsFarFromRotations(focal_px, report_.start.focal)) {
       DisbelieveFit(ran_away, &report_);
     }
-    if (pulled) report_.calibration.determined.fill(false);
+    if (!ran_away && report_.noise_over_smooth > kNoiseOfAstray) DisbelievePulledFit(&report_);
     AddDoubts(recording_, &report_);
     Tell("refinement", 1.0);
     return std::move(report_);
@@ -176,21 +179,25 @@ class CalibrationJob {
     return MayTryWhatLeadsAstray() && (IsFarFromRotations(fit.lens[kFocal], report_.start.focal) ||
                                        RanAway(fit.lens[kFocal], from_start_.lens[kFocal]));
   }
-  bool NoiseIsAstray(double noise_px) const {
-    return MayTryWhatLeadsAstray() && NoiseOverSmooth(recording_, noise_px) > kNoiseOfAstray;
+  bool NoiseIsAstray() const {
+    return MayTryWhatLeadsAstray() && report_.noise_over_smooth > kNoiseOfAstray;
+  }
+  double OverSmooth(const Calibration& fit, double noise_px) const {
+    return NoiseOverSmooth(recording_, input_, fit, noise_px, graph_options_);
   }
 
   // The calibration with an effect that leads fits astray and that the data bear out: of its
   // shapes, and of several such effects, with the one that fits unseen frames best. astray: the fit
   // without it, and its noise.
   std::optional<CalibrationReport> TryWhatLeadsAstray(const CameraRotationsAt& rotations_at,
-                                                      const Calibration& astray, double noise_px) {
+                                                      const Calibration& astray, double noise_px,
+                                                      double over_smooth) {
     tried_what_leads_astray_ = true;
     if (!report_.residual->facts().with_effects) return std::nullopt;
     const double begin_px = from_start_.lens[kFocal];
     const EffectEntry* added = nullptr;
     std::optional<CalibrationReport> best = FitWithWhatLeadsAstray(
-        recording_, report_.start, from_start_, noise_px,
+        recording_, report_.start, from_start_, noise_px, over_smooth,
         [&](const std::string& effect) {
           CalibrateOptions with = options_;
           with.effects += (with.effects.empty() ? "" : ",") + effect;

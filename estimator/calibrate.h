@@ -80,6 +80,7 @@ struct CalibrationReport {
   // Disagreement of the fits of the two halves, chi-square per parameter; 0: not tested (short).
   // Beyond its 99.9 % quantile the covariance is multiplied by it, and a doubt says so.
   double halves_chi2 = 0.0;
+  double noise_over_smooth = 0.0;  // of the fit (estimator/astray.h); 0: not known
   int skipped_pairs = 0;
   int moving_tracks = 0;  // left out of the refinement (estimator/moving_tracks.h)
   // With frame_stamp_jitter: the frames' own times, by nanoseconds after the first gyro stamp.

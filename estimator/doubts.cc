@@ -60,6 +60,16 @@ void DisbelieveFit(bool ran_away, CalibrationReport* report) {
   if (!IsUseful(kStateDelay, report->prior, c)) c.determined[kStateDelay] = false;
 }
 
+void DisbelievePulledFit(CalibrationReport* report) {
+  report->calibration.determined.fill(false);
+  const double noise_px = report->quality.noise_px;
+  report->doubts.push_back(Format(
+      "the fit leaves %.2f px, where the points move smoothly to within %.2f px: something moves "
+      "the whole picture that the model lacks, and pulls every value by more than its sigma; "
+      "was the picture stabilised?",
+      noise_px, noise_px / report->noise_over_smooth));
+}
+
 void AddDoubts(const Recording& recording, CalibrationReport* report) {
   const Calibration& c = report->calibration;
   const StateVector sigma = c.sigma();
@@ -73,15 +83,6 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
         "be believed; by rotation alone, the start found a delay of %.1f ms in the middle "
         "row",
         c.lens[kFocal], 1e3 * report->start.delay_middle_row_s));
-  }
-  const double noise_px = report->quality.noise_px;
-  const double over_smooth = NoiseOverSmooth(recording, noise_px);
-  if (over_smooth > kNoiseOfAstray) {
-    report->doubts.push_back(Format(
-        "the fit leaves %.2f px, where the points move smoothly to within %.2f px: something moves "
-        "the whole picture that the model lacks, and pulls every value by more than its sigma; "
-        "was the picture stabilised?",
-        noise_px, noise_px / over_smooth));
   }
   if (IsFarFromRotations(c.lens[kFocal], report->start.focal)) {
     report->doubts.push_back(Format(

@@ -20,6 +20,10 @@ void MarkDetermined(bool attitudes, const Prior& prior, Calibration* calibration
 // what the middle row's is.
 void DisbelieveFit(bool ran_away, CalibrationReport* report);
 
+// Of a fit that leaves what is smooth over the picture (CalibrationReport::noise_over_smooth is
+// more than kNoiseOfAstray): nothing is determined, and a doubt says why.
+void DisbelievePulledFit(CalibrationReport* report);
+
 // Adds to doubts and notes what speaks against a result that is complete otherwise.
 void AddDoubts(const Recording& recording, CalibrationReport* report);
 

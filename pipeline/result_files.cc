@@ -169,6 +169,9 @@ void EmitQuality(YAML::Emitter& out, const CalibrationReport& report, bool attit
   if (report.halves_chi2 > 0.0) {
     out << YAML::Key << "halves_chi2" << YAML::Value << report.halves_chi2;
   }
+  if (report.noise_over_smooth > 0.0) {
+    out << YAML::Key << "noise_over_smooth" << YAML::Value << report.noise_over_smooth;
+  }
   std::vector<std::string> unobservable;
   for (size_t i = 0; i < kStateSize; ++i) {
     if (!report.calibration.determined[i]) unobservable.push_back(StateNames()[i]);

@@ -5,7 +5,7 @@
 
 #include "core/parallel.h"
 #include "core/robust_statistics.h"
-#include "estimator/window/pair_selection.h"
+#include "estimator/window/smooth_motion.h"
 
 namespace camgyro {
 namespace {

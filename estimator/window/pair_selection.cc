@@ -5,13 +5,11 @@
 #include <cmath>
 #include <vector>
 
-#include "core/linear_algebra.h"
 #include "core/robust_statistics.h"
+#include "estimator/window/smooth_motion.h"
 
 namespace camgyro {
 namespace {
-
-constexpr int NumTerms(int degree) { return (degree + 1) * (degree + 2) / 2; }
 
 // Variance of both coordinates together, robust, of pairs all over the recording [px^2]; negative
 // if none has enough matches.
@@ -33,47 +31,6 @@ double UnsmoothVariance(const Recording& recording, int gap) {
 
 }  // namespace
 
-double UnsmoothVariance(const std::vector<Match>& matches, const Eigen::Vector2d& size_px) {
-  constexpr int kHighest = 3, kMatchesPerTerm = 3;
-  const auto n = static_cast<Eigen::Index>(matches.size());
-  int degree = kHighest;
-  while (degree >= 0 && n < kMatchesPerTerm * NumTerms(degree)) --degree;
-  if (degree < 0) return -1.0;
-  Eigen::MatrixXd A(n, NumTerms(degree));
-  Eigen::MatrixX2d moved(n, 2);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Match& match = matches[static_cast<size_t>(i)];
-    const Eigen::Vector2d at = match.px_a.cwiseQuotient(size_px) - Eigen::Vector2d(0.5, 0.5);
-    int term = 0;
-    for (int p = 0; p <= degree; ++p) {
-      for (int q = 0; p + q <= degree; ++q) {
-        A(i, term++) = std::pow(at.x(), p) * std::pow(at.y(), q);
-      }
-    }
-    moved.row(i) = match.px_b - match.px_a;
-  }
-  // Least squares with Huber's weights: what is near, and wrong matches, pull by their direction.
-  constexpr int kIterations = 5;
-  constexpr double kHuber = 1.5;  // of the scale
-  Eigen::VectorXd weights = Eigen::VectorXd::Ones(n);
-  Eigen::MatrixX2d rest;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const Eigen::MatrixXd WA = weights.asDiagonal() * A;
-    rest = moved - A * SymmetricSolver(A.transpose() * WA).Solve(WA.transpose() * moved);
-    const Eigen::VectorXd lengths = rest.rowwise().norm();
-    std::vector<double> sorted(lengths.data(), lengths.data() + n);
-    const double limit = kHuber * MedianInPlace(&sorted);
-    weights = (limit * lengths.cwiseMax(1e-9).cwiseInverse()).cwiseMin(1.0);
-  }
-  double variance = 0.0;
-  for (int k = 0; k < 2; ++k) {
-    const Eigen::VectorXd magnitudes = rest.col(k).cwiseAbs();
-    std::vector<double> sorted(magnitudes.data(), magnitudes.data() + n);
-    variance += std::pow(kSigmaOfMedian * MedianInPlace(&sorted), 2);
-  }
-  return variance * static_cast<double>(n) / static_cast<double>(n - NumTerms(degree));
-}
-
 double ParallaxPerFrame(const Recording& recording, int gap) {
   const double near = UnsmoothVariance(recording, 1), far = UnsmoothVariance(recording, gap);
   if (near < 0.0 || far < 0.0) return std::numeric_limits<double>::infinity();
@@ -81,16 +38,6 @@ double ParallaxPerFrame(const Recording& recording, int gap) {
   const double of_frame = std::max(0.0, far - near) / (gap * gap - 1.0);
   const double noise = 0.5 * std::max(1e-12, near - of_frame);
   return std::sqrt(of_frame / noise);
-}
-
-double NoiseOfSmoothMotion(const Recording& recording, const PairSelection& selection) {
-  const double variance = UnsmoothVariance(recording, 1);
-  if (variance < 0.0) return std::numeric_limits<double>::infinity();
-  // Of two coordinates; where a tracker re-anchors, errors add up from frame to frame, else both
-  // observations have theirs.
-  return std::sqrt(recording.match_noise == MatchNoise::kSecondImage
-                       ? selection.gap * variance / 2.0
-                       : variance / 4.0);
 }
 
 PairSelection SelectPairs(const Recording& recording, const GapLimits& limits) {

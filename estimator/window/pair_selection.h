@@ -58,12 +58,6 @@ constexpr GapLimits kGapLimitsOfPoorStart{std::numeric_limits<int>::max(), 100, 
 // and beyond it they grow (docs/lab/pairs.md).
 PairSelection SelectPairs(const Recording& recording, const GapLimits& limits = {});
 
-// What of a pair's displacements is no smooth function of the place in the picture, as all that a
-// turn, a lens, a shutter or a plane makes is: the sum of the variances of both coordinates, robust
-// [px^2]. Smooth is a polynomial, of the third degree if there are matches enough (30). Of a turn
-// by 0.1 rad, the fourth is less than 0.1 px at f = 650 px. Negative if there are too few for any.
-double UnsmoothVariance(const std::vector<Match>& matches, const Eigen::Vector2d& size_px);
-
 // By how much parallaxes of a pair should differ [standard deviation, in noise of a displacement].
 constexpr double kLeastParallax = 2.0;
 // What differs by less over GapLimits::far_s has no parallax. Simulated: 0.6 and more of points at
@@ -74,11 +68,6 @@ constexpr double kLeastFarParallax = 0.4;
 // calibration, from tracks whose observations have errors of their own: UnsmoothVariance over `gap`
 // frames (at least 2) less that between neighbours. Infinite where no pair has enough matches.
 double ParallaxPerFrame(const Recording& recording, int gap);
-
-// Noise of an observation in the pairs of a selection, per coordinate, by the UnsmoothVariance of
-// neighbours. Their parallax is in it, so that a fit with more noise explains less than somebody
-// who knows nothing of cameras [px]. Infinite where no pair has enough matches.
-double NoiseOfSmoothMotion(const Recording& recording, const PairSelection& selection);
 
 }  // namespace camgyro
 

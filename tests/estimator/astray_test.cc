@@ -10,6 +10,7 @@
 
 #include "core/effects/catalogue.h"
 #include "estimator/calibrate.h"
+#include "estimator/window/pair_selection.h"
 #include "tests/estimator/simulated_input.h"
 #include "tests/rotations_of_pictures.h"
 
@@ -69,6 +70,34 @@ TEST(Astray, WhatSpeaksAgainstAnEffect) {
   EXPECT_THAT(Implausible(item, fit, focal_px), HasSubstr("k1"));
   fit.effect_values = Eigen::Vector2d(-0.002, 0.0029);  // of sigmas of 0.001
   EXPECT_FALSE(IsSeen(item, fit));
+}
+
+// What a fit leaves is each point's own, whether the tracks' errors add up from frame to frame, and
+// nobody says so, or not: at the truth nothing smooth is left, off it something is.
+TEST(Astray, ErrorsThatAddUpAreNotSmooth) {
+  simulation::Scenario scenario = ShortScenario(4.0);
+  scenario.camera.rate_hz = 60.0;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kSlow);
+  scenario.tracks.count = 90;
+  for (const bool reanchored : {false, true}) {
+    scenario.tracks.reanchored = reanchored;
+    scenario.tracks.noise_px = reanchored ? 0.1 : 0.5;
+    simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+    s.recording.match_noise = MatchNoise::kBothImages;
+    const PairSelection selection = SelectPairs(s.recording);
+    const EstimationInput input = OutlineOf(s.recording, selection);
+    const double noise_px = reanchored ? 0.1 * std::sqrt(0.5 * selection.gap) : 0.5;
+    EXPECT_NEAR(NoiseOverSmooth(s.recording, input, s.truth, noise_px, {}), 1.0, 0.15);
+    Calibration wrong = s.truth;
+    wrong.delay_s += 0.15;
+    EXPECT_GT(NoiseOverSmooth(s.recording, input, wrong, noise_px, {}), kNoiseOfAstray);
+  }
+}
+
+TEST(Astray, AttitudesLeaveNothingOverAPicture) {
+  Recording recording;
+  recording.q_cam_world.resize(2);
+  EXPECT_EQ(NoiseOverSmooth(recording, {}, {}, 1e-3, {}), 0.0);
 }
 
 Result<CalibrationReport> Calibrate(const Recording& recording, const CalibrateOptions& options) {

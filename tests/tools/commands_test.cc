@@ -122,9 +122,10 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
               result["clock"]["delay_s"]["sigma"].as<double>(), 1e-12);
   EXPECT_NEAR(result["quality"]["noise_px"].as<double>(), 0.2, 0.03);
   for (const char* key : {"pairs", "matches", "inlier_ratio", "rms_px", "unseen_rms_px",
-                          "halves_chi2", "unobservable"}) {
+                          "halves_chi2", "noise_over_smooth", "unobservable"}) {
     EXPECT_TRUE(result["quality"][key]) << key;
   }
+  EXPECT_NEAR(result["quality"]["noise_over_smooth"].as<double>(), 1.0, 0.2);
   EXPECT_THAT(ReadFile(Path("result/trace.csv")),
               testing::StartsWith("#timestamp_ns,focal_px,cx_px,cy_px,readout_s,delay_s,bias_x,"
                                   "bias_y,bias_z,q_w,q_x,q_y,q_z,sigma_focal_px,"));
