@@ -38,6 +38,7 @@ cv::Mat SmallPicture(const cv::Mat& gray);  // at most 512 px wide
 struct TrackingSummary {
   double outlier_ratio = 0.0;  // share of matches taken for wrong
   double seconds = 0.0;
+  bool noise_adds_up = false;  // found in tracks of others (pipeline/track_noise.h)
   // A few frames in a row at 1/8, 3/8, 5/8 and 7/8 of the recording: to decode them once more, for
   // the report, takes as long as all frames where the video has a single key picture.
   SmallPictures pictures;

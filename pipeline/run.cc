@@ -8,6 +8,7 @@
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "frontend/camera_rotations.h"
 #include "frontend/track_jumps.h"
+#include "pipeline/track_noise.h"
 
 namespace camgyro {
 
@@ -24,7 +25,13 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
     return tl::unexpected(enough.error());
   }
   DropRepeatedPictures(recording);
-  if (tracked_elsewhere) summary->outlier_ratio = RemoveTrackJumps(recording).wrong_ratio();
+  if (tracked_elsewhere) {
+    summary->outlier_ratio = RemoveTrackJumps(recording).wrong_ratio();
+    if (recording->match_noise == MatchNoise::kBothImages && TrackNoiseAddsUp(*recording)) {
+      recording->match_noise = MatchNoise::kSecondImage;
+      summary->noise_adds_up = true;
+    }
+  }
   return summary;
 }
 
@@ -34,6 +41,17 @@ CameraRotationsAt RotationsFrom(const Recording& recording, size_t max_pairs) {
     return CameraRotationsOf(now, pairs, trials);
   };
 }
+
+namespace {
+
+void AddNotesOfTracks(const TrackingSummary& tracking, CalibrationReport* report) {
+  if (!tracking.noise_adds_up) return;
+  report->notes.push_back(
+      "the errors of the tracks add up from frame to frame, as those of a tracker that re-anchors "
+      "at every frame: pairs of frames follow one another");
+}
+
+}  // namespace
 
 Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEstimator estimator,
                                       DeviceClass device, const Progress& progress,
@@ -46,6 +64,7 @@ Result<CalibrationRun> RunCalibration(const CalibrateOptions& options, OnlineEst
           ? CalibrateWithEkf(*recording, rotations_at, options, {})
           : CalibrateRecording(*recording, rotations_at, options, progress);
   if (!report) return tl::unexpected(Refusal(*recording, report.error()));
+  AddNotesOfTracks(*tracking, &*report);
   if (estimator == OnlineEstimator::kWindow) {
     if (const auto doubt = CheckModel(*recording, options, device, &*report)) {
       report->doubts.push_back(*doubt);
@@ -65,7 +84,9 @@ Result<DiagnosisRun> RunDiagnosis(const DiagnoseOptions& options, DeviceClass de
   DiagnosisRun run{*tracking, Diagnose(RotationsFrom(*recording), options, recording, progress)};
   // What the loop says of the model is tested on unseen frames: it needs no doubt beside.
   for (auto* report : {&run.diagnosis.before, &run.diagnosis.after}) {
-    if (*report) CheckModel(*recording, options.calibrate, device, &**report);
+    if (!*report) continue;
+    AddNotesOfTracks(*tracking, &**report);
+    CheckModel(*recording, options.calibrate, device, &**report);
   }
   return run;
 }

@@ -124,6 +124,23 @@ TEST_F(FaultyRecording, FrameStampsOutOfOrder) {
 
 // A left-handed gyro is mended where it stands, so that whatever looks at the recording afterwards
 // (the total of the sigmas, the report) sees what the calibration has seen.
+// A file of tracks does not say how they were made, so that they are asked.
+TEST(EnsureImageMotion, FindsTracksWhoseErrorsAddUp) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 8.0;
+  scenario.tracks.noise_px = 0.1;
+  for (const bool reanchored : {false, true}) {
+    scenario.tracks.reanchored = reanchored;
+    Recording recording = simulation::SimulateTracks(scenario)->recording;
+    recording.match_noise = MatchNoise::kBothImages;
+    const auto summary = EnsureImageMotion(nullptr, &recording);
+    ASSERT_TRUE(summary.has_value()) << summary.error().message;
+    EXPECT_EQ(summary->noise_adds_up, reanchored);
+    EXPECT_EQ(recording.match_noise,
+              reanchored ? MatchNoise::kSecondImage : MatchNoise::kBothImages);
+  }
+}
+
 TEST(RunDiagnosis, MendsTheGyroForAllThatFollows) {
   simulation::Scenario scenario;
   scenario.duration_s = 12.0;
