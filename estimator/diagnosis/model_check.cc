@@ -78,7 +78,7 @@ Tested Score(const Recording& recording, const CalibrateOptions& options, Device
   t.candidates = std::move(with_columns);
   t.usual = UsualOf(t.candidates, recording, model, device);
 
-  EstimationInput input = OutlineOf(recording, SelectPairs(recording));
+  EstimationInput input = OutlineOf(recording, SelectPairsToTest(recording));
   TakeNoiseFactors(report.noise_factors, &input.pairs);
   const Shares shares =
       MakeShares(recording, input, {kMostFitPairs, kMostFitPairs, 0, /*with_report=*/false});

@@ -15,7 +15,7 @@ namespace camgyro {
 namespace {
 
 EstimationInput OutlineWithNoise(const LoopInput& in) {
-  EstimationInput outline = OutlineOf(*in.recording, SelectPairs(*in.recording));
+  EstimationInput outline = OutlineOf(*in.recording, SelectPairsToTest(*in.recording));
   TakeNoiseFactors(in.noise_factors, &outline.pairs);
   return outline;
 }
@@ -37,7 +37,7 @@ SharedFits::SharedFits(const LoopInput& in, const DiagnoseOptions& options)
   if (in.recording->HasOnlyAttitudes()) return;
   // So that no two of them share noise: as far apart as the others, and where a tracker re-anchors,
   // one after the other.
-  const int stride = reanchored ? kNearestGap : SelectPairs(*in.recording).stride;
+  const int stride = reanchored ? kNearestGap : SelectPairsToTest(*in.recording).stride;
   const Shares nearest =
       shares_of({kNearestGap, stride}, {kMostFitPairs, kMostFitPairs, 0, /*with_report=*/false});
   near_pairs_ = Joined(nearest.fit);

@@ -47,6 +47,18 @@ void AddMatches(const Recording& recording, std::vector<PairBlock>* blocks) {
 
 }  // namespace
 
+PairSelection SelectPairsToTest(const Recording& recording) {
+  PairSelection selection = SelectPairs(recording);
+  if (selection.gap == 1) return selection;  // neighbours do not overlap
+  // Gaps are odd where pairs overlap, so that pairs from even frames share none.
+  const double interval_s = MedianInterval(recording.frames);
+  while (selection.stride < selection.gap &&
+         selection.stride * interval_s * kMostPairsPerS < 0.95) {  // 59.94 frames/s are 60
+    selection.stride += 2;
+  }
+  return selection;
+}
+
 Shares MakeShares(const Recording& recording, const EstimationInput& input,
                   const ShareLimits& limits) {
   Shares shares;

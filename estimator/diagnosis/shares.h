@@ -8,6 +8,7 @@
 
 #include "core/recording.h"
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/pair_selection.h"
 
 namespace camgyro {
 
@@ -32,6 +33,10 @@ struct ShareLimits {
   size_t fit = kAll, choice = kAll, report = kAll;
   bool with_report = true;  // false: `report` stays empty
 };
+
+// The pairs that are tested: those that are fitted (SelectPairs), of cameras of more than 60
+// frames/s as many as of such a one (kMostPairsPerS). As there, no two share an observation.
+PairSelection SelectPairsToTest(const Recording& recording);
 
 // Short blocks, so that what changes with time is seen by all shares: 1/40 of the recording, within
 // 0.2 and 3 s, at least 6 frames and twice the length of a pair; longer ones where there would be

@@ -20,6 +20,12 @@ constexpr double kLeastFramesOfBlock = 6.0;
 // And it is so many times as long as a pair, since pairs across its ends are in no share: of two,
 // half of them stay. Where nothing is near, pairs span 0.8 s (SelectPairs).
 constexpr double kLeastPairsOfBlock = 2.0;
+// At most so many pairs begin in a second. Pairs of one stretch overlap in time, and share the
+// gyro's noise; the more of them there are, the more that is of what their scores have in common,
+// which the tests take for independent. Of 60 frames/s every second frame begins one, as of slower
+// cameras; of 240 clock_skew was named where nothing is wrong, and the smallest p of 22 candidates
+// was 0.00003 to 0.004 (docs/lab/pairs.md, "Fast cameras").
+constexpr double kMostPairsPerS = 30.0;
 // Pairs of the report share that have matches of their own tracks, below which it shares tracks.
 constexpr size_t kLeastReportPairs = 20;
 

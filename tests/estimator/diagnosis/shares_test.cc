@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <tuple>
@@ -30,6 +31,27 @@ Recording Moving(simulation::MotionKind kind, double duration_s) {
   auto simulated = simulation::SimulateTracks(scenario);
   EXPECT_TRUE(simulated);
   return std::move(simulated->recording);
+}
+
+// As many pairs of a fast camera as of one of 60 frames/s, and no observation twice.
+TEST(SelectPairsToTest, AreNoMoreOfFastCameras) {
+  for (const double rate_hz : {30.0, 60.0, 120.0, 240.0}) {
+    simulation::Scenario scenario;
+    scenario.duration_s = 8.0;
+    scenario.camera.rate_hz = rate_hz;
+    scenario.camera.readout_s = 0.004;
+    scenario.tracks.count = 40;
+    Recording recording = simulation::SimulateTracks(scenario)->recording;
+    const PairSelection selection = SelectPairsToTest(recording);
+    EXPECT_EQ(selection.gap, SelectPairs(recording).gap);
+    EXPECT_NEAR(rate_hz / selection.stride, std::min(0.5 * rate_hz, 30.0), 0.1);
+    std::set<int> seen;
+    for (const TimedPair& pair : MakeEstimationInput(recording, selection).pairs) {
+      EXPECT_TRUE(seen.insert(pair.frame_a).second && seen.insert(pair.frame_b).second);
+    }
+    recording.match_noise = MatchNoise::kSecondImage;  // one after the other
+    EXPECT_EQ(SelectPairsToTest(recording).stride, SelectPairs(recording).stride);
+  }
 }
 
 std::set<int> Frames(const std::vector<PairBlock>& blocks) {
