@@ -335,6 +335,13 @@ ReportSection FitSection(const CalibrationReport& report, bool attitudes) {
         {{"disagreement of the two halves, chi2 per parameter (1 expected)", "", 0.0},
          {Format("%.2f", report.halves_chi2), "quality.halves_chi2", report.halves_chi2}});
   }
+  if (report.noise_over_smooth > 0.0) {
+    noise.rows.push_back(
+        {{"what is left, over what is left without what is smooth over the picture (1 expected)",
+          "", 0.0},
+         {Format("%.2f", report.noise_over_smooth), "quality.noise_over_smooth",
+          report.noise_over_smooth}});
+  }
   std::string html = (table.rows.empty() ? "" : TableHtml(table)) + TableHtml(noise);
   html += Paragraph(
       report.unseen

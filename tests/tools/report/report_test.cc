@@ -100,7 +100,7 @@ TEST_F(ReportTest, BrowserShowsTheNumbersOfTheCalibration) {
     EXPECT_NEAR(std::stod(page.dom.substr(value)), expected, 2e-9 * std::abs(expected)) << path;
     ++compared;
   }
-  EXPECT_EQ(compared, 8 + 11 + 7);  // values but the rotation's, sigmas, quality
+  EXPECT_EQ(compared, 8 + 11 + 8);  // values but the rotation's, sigmas, quality
   // What people read is the rounded value.
   EXPECT_NEAR(std::stod(page.dom.substr(page.dom.find('>', page.dom.find("focal_px.value")) + 1)),
               yaml["camera"]["focal_px"]["value"].as<double>(),
