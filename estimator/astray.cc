@@ -70,6 +70,11 @@ double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
   AddMatches(recording, &pairs);
   const std::vector<MatchResidual> rows = ComputeResiduals(input, pairs, fit, noise_px, options);
   const Eigen::Vector2d size_px(fit.width_px, fit.height_px);
+  // A gyro's noise turns the whole picture, too: what it may leave of each pair, of its length.
+  const double per_second_px2 = std::pow(fit.lens[kFocal] * options.gyro_sigma_rad_s.mean(), 2) *
+                                MedianInterval(recording.gyro);
+  const double interval_s = MedianInterval(recording.frames);
+  double of_gyro_px2 = 0.0;
   LeftOver sum;
   for (auto begin = rows.begin(); begin != rows.end();) {
     std::vector<Eigen::Vector2d> places_px, corrections_px;
@@ -82,10 +87,12 @@ double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
     if (const auto of_pair = SeparateSmooth(places_px, corrections_px, size_px)) {
       sum.all += of_pair->all;
       sum.unsmooth += of_pair->unsmooth;
+      of_gyro_px2 += per_second_px2 * interval_s * (begin->frame_b - begin->frame_a);
     }
     begin = row;
   }
-  return sum.unsmooth > 0.0 ? std::sqrt(sum.all / sum.unsmooth) : 0.0;
+  const double all = std::max(std::min(sum.all, sum.unsmooth), sum.all - of_gyro_px2);
+  return sum.unsmooth > 0.0 ? std::sqrt(all / sum.unsmooth) : 0.0;
 }
 
 void LookThroughFittedLens(const Recording& recording, const CalibrateOptions& options,

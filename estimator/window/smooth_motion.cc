@@ -99,8 +99,8 @@ std::optional<LeftOver> SeparateSmooth(const std::vector<Eigen::Vector2d>& place
   Eigen::VectorXd lengths = Eigen::VectorXd::Zero(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto k = static_cast<size_t>(i);
+    if (!corrections_px[k].allFinite() || corrections_px[k].isZero(0.0)) continue;
     lengths[i] = corrections_px[k].norm();
-    if (!(lengths[i] > 0.0)) continue;
     const Eigen::Vector2d across = corrections_px[k] / lengths[i];
     const Eigen::RowVectorXd at = TermsAt(places_px[k], size_px, degree);
     A.row(i) << across.x() * at, across.y() * at;
