@@ -94,6 +94,22 @@ TEST(Astray, ErrorsThatAddUpAreNotSmooth) {
   }
 }
 
+// Residuals are of the gyro's own rates, whose noise turns the whole picture.
+TEST(Astray, WhatANoisyGyroTurnsIsTakenOff) {
+  simulation::Scenario scenario = ShortScenario(8.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kRotation);
+  scenario.gyro.noise_density_rad_s_rtHz = 3e-3;
+  scenario.tracks.count = 90;
+  scenario.tracks.noise_px = 0.02;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const EstimationInput input = OutlineOf(s.recording, SelectPairs(s.recording));
+  PairGraphOptions options;
+  options.gyro_sigma_rad_s.setZero();
+  EXPECT_GT(NoiseOverSmooth(s.recording, input, s.truth, 0.02, options), kNoiseOfAstray);
+  options.gyro_sigma_rad_s.setConstant(3e-3 * std::sqrt(scenario.gyro.rate_hz));
+  EXPECT_LT(NoiseOverSmooth(s.recording, input, s.truth, 0.02, options), 1.2);
+}
+
 TEST(Astray, AttitudesLeaveNothingOverAPicture) {
   Recording recording;
   recording.q_cam_world.resize(2);
