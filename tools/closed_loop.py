@@ -4,11 +4,11 @@
     tools/closed_loop.py [path of camgyro] [recording...]
     tools/closed_loop.py --times FOLDER
 
-Default: build/release/tools/camgyro, all recordings; of recordings that are not named the document
-keeps its rows. They lie in $CAMGYRO_DATA (default: ../shared/data beside the source). docs/lab/
-closed_loop_notes.md, the stories, is put in front of the tables word by word. --times draws only the
-picture of frames' own times, from what `camgyro calibrate phone-edge-hand --out FOLDER` has written.
+Of recordings that are not named the document keeps its rows. They lie in $CAMGYRO_DATA (default:
+../shared/data beside the source). docs/lab/closed_loop_notes.md, the stories, is put in front of the
+tables word by word.
 """
+import argparse
 import csv
 import math
 import os
@@ -358,13 +358,23 @@ def write(results):
 
 
 def main():
-    camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("camgyro", nargs="?", default=SOURCE + "/build/release/tools/camgyro",
+                        help="the program (default: %(default)s)")
+    parser.add_argument("recordings", nargs="*", metavar="recording", help="default: all")
+    parser.add_argument("--times", metavar="FOLDER", help="draw only the picture of frames' own "
+                        "times, from what `camgyro calibrate phone-edge-hand --out FOLDER` wrote")
+    options = parser.parse_args()
+    unknown = set(options.recordings) - set(NAMES)
+    if unknown:
+        parser.error("unknown: %s; there are %s" % (", ".join(sorted(unknown)), ", ".join(NAMES)))
     plt.rcParams.update({"font.size": 9, "svg.hashsalt": "camgyro"})
-    if camgyro == "--times":
-        print(plot_frame_times([dict(name="phone-edge-hand", out=sys.argv[2])], "phone-edge-hand",
-                               TIMES_FILE))
+    if options.times:
+        print(plot_frame_times([dict(name="phone-edge-hand", out=options.times)],
+                               "phone-edge-hand", TIMES_FILE))
         return
-    chosen = sys.argv[2:]
+    camgyro, chosen = options.camgyro, options.recordings
     folder = tempfile.mkdtemp(prefix="closed_loop_")
     results = []
     with ThreadPoolExecutor(2) as pool:

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Delays between gyros on one rigid body, by their readings and by camgyro.
 
-    tools/compare_gyros.py [path of camgyro]        (default: build/release/tools/camgyro)
+    tools/compare_gyros.py [path of camgyro]
 
 Prints the tables of "one camera, five gyros" in docs/lab/measured_notes.md; the recordings lie in
 $CAMGYRO_DATA/tango-walk (default: ../shared/data beside the source). Of every two gyros, the delay
@@ -11,9 +11,9 @@ fits best, M any 3 x 3 matrix: no camera and nothing of camgyro takes part. Thei
 should differ by as much. Stamps are a straight line over the number of the sample; beside it, as
 they are recorded.
 """
+import argparse
 import csv
 import os
-import sys
 import tempfile
 
 import numpy as np
@@ -101,8 +101,11 @@ def print_pairs(gyros):
 
 
 def main():
-    camgyro = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else
-                              os.path.join(SOURCE, "build/release/tools/camgyro"))
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("camgyro", nargs="?", help="the program (default: %(default)s)",
+                        default=os.path.join(SOURCE, "build/release/tools/camgyro"))
+    camgyro = os.path.abspath(parser.parse_args().camgyro)
     folders = [os.path.join(DATA, "tango-walk", name) for name in NAMES]
     read_all = [read(folder) for folder in folders]
     origin = read_all[0][0][0]

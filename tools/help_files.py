@@ -4,14 +4,15 @@
     tools/help_files.py CAMGYRO DIR
 
 writes DIR/man1/camgyro.1.gz and camgyro-COMMAND.1.gz, and DIR/completions/camgyro, which
-bash-completion loads: the same bytes from the same program. Nothing is written here that the program does not say, so that neither can be out of date.
+bash-completion loads: the same bytes from the same program. Nothing is written here
+that the program does not say, so that neither can be out of date.
 The build runs it for `cmake --install` (cmake/CamgyroInstall.cmake).
 """
+import argparse
 import gzip
 import os
 import re
 import subprocess
-import sys
 
 FLAG_COLUMN = 30  # of CommandHelp: where the descriptions start
 
@@ -128,7 +129,12 @@ def write(path, data):
 
 
 def main():
-    camgyro, folder = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("camgyro", metavar="CAMGYRO", help="the program")
+    parser.add_argument("folder", metavar="DIR")
+    options = parser.parse_args()
+    camgyro, folder = options.camgyro, options.folder
     said = lambda *words: subprocess.run([camgyro, *words], check=True, capture_output=True,
                                          encoding="utf-8").stdout
     version = " ".join(said("--version").split()[:2])

@@ -7,9 +7,9 @@ The phones turned, sampled and photographed as they did (../shared/data/timing-*
 moved as it logged. What is simulated around them is known: errors are those beside it. The text
 before the tables is docs/lab/device_logs_notes.md.
 """
+import argparse
 import os
 import subprocess
-import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
@@ -148,7 +148,11 @@ def stabiliser_table():
 
 
 def main():
-    camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("camgyro", nargs="?", default=SOURCE + "/build/release/tools/camgyro",
+                        help="the program (default: %(default)s)")
+    camgyro = parser.parse_args().camgyro
     tasks = [(run, seed) for run in RUNS for seed in SEEDS]
     with ThreadPoolExecutor(2) as pool:
         results = list(pool.map(lambda task: measure(camgyro, *task), tasks))

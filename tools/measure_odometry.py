@@ -1,8 +1,7 @@
 #!/usr/bin/python3
 """Runs `camgyro odometry` where the way is known, and prints the tables of docs/lab/odometry.md.
 
-    tools/measure_odometry.py [path of camgyro]           (default: build/release/tools/camgyro)
-    tools/measure_odometry.py --walks [path of camgyro]   the simulated walks of table 1 instead
+    tools/measure_odometry.py [--walks] [path of camgyro]
 
 Recordings of $CAMGYRO_DATA (default ../shared/data) with the calibration that camgyro finds of them
 (`--effects=radial_distortion,aspect_ratio`), which knows nothing of the truth; then the same with
@@ -16,11 +15,11 @@ the clock as others have it, held:
 --walks: tools/scenarios/walk_230m.yaml and walk_400m.yaml as ready tracks, calibrated (no effects:
 the lens has none) and ignored; then the first as a rendered video of 320 x 240 pixels, with loops.
 """
+import argparse
 import os
 import pathlib
 import re
 import subprocess
-import sys
 import tempfile
 
 import yaml
@@ -122,10 +121,16 @@ def walks(camgyro):
 
 
 def main():
-    paths = [argument for argument in sys.argv[1:] if argument != "--walks"]
-    camgyro = pathlib.Path(paths[0] if paths
-                           else SOURCE / "build/release/tools/camgyro").resolve()
-    if "--walks" in sys.argv:
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("camgyro", nargs="?", type=pathlib.Path,
+                        default=SOURCE / "build/release/tools/camgyro",
+                        help="the program (default: %(default)s)")
+    parser.add_argument("--walks", action="store_true",
+                        help="the simulated walks of table 1 instead")
+    options = parser.parse_args()
+    camgyro = options.camgyro.resolve()
+    if options.walks:
         walks(camgyro)
         return
     print("| Recording | clock | verdict | path [m] | online [m] | window [m] | scale [%] | "

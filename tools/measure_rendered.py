@@ -1,13 +1,13 @@
 #!/usr/bin/python3
 """Renders video scenarios, calibrates them from their pictures, and writes docs/lab/rendered.md.
 
-    tools/measure_rendered.py [path of camgyro]        (default: build/release/tools/camgyro)
+    tools/measure_rendered.py [path of camgyro]
 
 20 s of 640 x 480 each, tracked with the project's own KLT, beside the truth of the simulator.
 """
+import argparse
 import os
 import subprocess
-import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
@@ -54,7 +54,11 @@ def measure(camgyro, scenario, changes):
 
 
 def main():
-    camgyro = sys.argv[1] if len(sys.argv) > 1 else SOURCE + "/build/release/tools/camgyro"
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("camgyro", nargs="?", default=SOURCE + "/build/release/tools/camgyro",
+                        help="the program (default: %(default)s)")
+    camgyro = parser.parse_args().camgyro
     with ThreadPoolExecutor(2) as pool:
         measured = list(pool.map(lambda run: measure(camgyro, *run), RUNS))
     rows = [("Recording", "t_d - truth [ms]", "t_r - truth [ms]", "f - truth [%]",

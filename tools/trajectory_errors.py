@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Errors of trajectories of `camgyro odometry` against a known one.
 
-usage: tools/trajectory_errors.py TRUTH.tum DIR...
-
 TRUTH.tum: `time x y z qx qy qz qw` of the gyro (IMU) frame on the gyro's clock, z up. DIR: folders
 that `camgyro odometry --out` has written. One row for the poses as they were known online
 (trajectory.csv) and one for the keyframes as they left the window (keyframes.csv):
@@ -16,9 +14,9 @@ that `camgyro odometry --out` has written. One row for the poses as they were kn
   nees            e' C^-1 e / 3 of the position with its claimed covariance, mean; e from alignment
                   at the first keyframe, where the covariance is zero by definition
 """
+import argparse
 import csv
 import pathlib
-import sys
 
 import numpy as np
 
@@ -128,12 +126,15 @@ def figures(truth, poses, anchor):
 
 
 def main():
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
-    truth = Truth(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("truth", metavar="TRUTH.tum")
+    parser.add_argument("folders", metavar="DIR", nargs="+", type=pathlib.Path)
+    options = parser.parse_args()
+    truth = Truth(options.truth)
     print("| result | poses | path [m] | rmse_4 [m] | rmse_6 [m] | scale [%] | rel_5m [%] | "
           "yaw [deg] | end [%] | nees |\n|" + " --- |" * 10)
-    for folder in map(pathlib.Path, sys.argv[2:]):
+    for folder in options.folders:
         keyframes = Poses(folder / "keyframes.csv")
         for name, poses in (("online", Poses(folder / "trajectory.csv")), ("window", keyframes)):
             f = figures(truth, poses, keyframes)
