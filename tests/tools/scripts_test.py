@@ -13,6 +13,17 @@ TOOLS = os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abs
 OPTIONAL = ("matplotlib", "numpy", "scipy", "yaml")  # not on every machine that runs the tests
 
 
+def modules_of(path):
+    """What a script imports, also by way of the others beside it."""
+    with open(path, encoding="utf-8") as file:
+        found = set(re.findall(r"^(?:import|from) (\w+)", file.read(), re.M))
+    for name in sorted(found):
+        beside = os.path.join(TOOLS, name + ".py")
+        if os.path.exists(beside):
+            found |= modules_of(beside)
+    return found
+
+
 class ScriptsTest(unittest.TestCase):
     def test_all_have_help(self):
         for path in sorted(glob.glob(TOOLS + "/*.py")):
@@ -20,8 +31,8 @@ class ScriptsTest(unittest.TestCase):
                 source = file.read()
             if '__name__ == "__main__"' not in source:
                 continue  # a module of the others
-            missing = [name for name in OPTIONAL if importlib.util.find_spec(name) is None
-                       and re.search(r"^(import|from) %s\b" % name, source, re.M)]
+            missing = sorted(name for name in modules_of(path).intersection(OPTIONAL)
+                             if importlib.util.find_spec(name) is None)
             with self.subTest(os.path.basename(path)):
                 if missing:
                     self.skipTest("no " + ", ".join(missing))
