@@ -13,6 +13,7 @@
 #include "estimator/astray.h"
 #include "estimator/gyro_clock.h"
 #include "estimator/window/estimation_input.h"
+#include "estimator/window/gyro_noise.h"
 #include "estimator/window/refinement.h"
 
 namespace camgyro {

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "core/parallel.h"
+#include "estimator/window/gyro_noise.h"
 #include "pipeline/result_files.h"
 #include "tools/commands.h"
 #include "tools/comparison/comparison_report.h"

@@ -4,8 +4,8 @@ class usually show and declared by nobody, and prints how the errors compare wit
 
     tools/random_devices.py [--device phone|action|industrial] [--seeds A-B] [--duration S]
                             [--motions NAME,...] [--clean] [--strange] [--rendered] [--attitudes]
-                            [--diagnose] [--effects LIST] [--stream PREPARE_VIO] [--jobs N]
-                            [--camgyro PATH] [KEY=VALUE ...]
+                            [--undeclared] [--diagnose] [--effects LIST] [--stream PREPARE_VIO]
+                            [--jobs N] [--camgyro PATH] [KEY=VALUE ...]
 
 The sizes are those of the class in core/effects/device_class.cc, read from that file. --clean draws
 nothing: for how often a doubt is said of a device that has no effect. --strange also draws how each
@@ -13,15 +13,15 @@ was recorded: motion, length, rates, size of the picture, mounting, stamps of ar
 frames that are missing, wrong, few and short-lived tracks, and things that move. --rendered: video
 of a scene, light and compression that are drawn instead of tracks. --attitudes: attitudes with
 errors that add up from frame to frame instead of tracks, made from rows of a rolling shutter, and
-a gyro of 100 Hz; what needs pixels is not determined then. --diagnose: what `diagnose` makes of the
-devices, instead of `calibrate`, and what it names. --effects: to be fitted as well.
---stream: what the library's Calibrator makes of them, frame by frame, with that program
-(examples/recording); of phones only. KEY=VALUE changes the scenario of all recordings, as in
-`camgyro simulate` (scene.moving_objects=2). Prints a table by parameter: part of the errors within
-3 sigma_total, their rms in sigma_total, the medians of sigma_total and of the errors' size (times
-1.48, the spread) [px, s, rad/s, rad] and their ratio, the recordings with errors beyond 3
-sigma_total (or, with --clean, beyond 4 sigmas of noise), and the NEES per parameter with the total
-covariance.
+a gyro of 100 Hz; what needs pixels is not determined then. --undeclared: the recording does not say
+how noisy its gyro is. --diagnose: what `diagnose` makes of the devices, instead of `calibrate`, and
+what it names. --effects: to be fitted as well. --stream: what the library's Calibrator makes of
+them, frame by frame, with that program (examples/recording); of phones only. KEY=VALUE changes the
+scenario of all recordings, as in `camgyro simulate` (scene.moving_objects=2). Prints a table by
+parameter: part of the errors within 3 sigma_total, their rms in sigma_total, the medians of
+sigma_total and of the errors' size (times 1.48, the spread) [px, s, rad/s, rad] and their ratio,
+the recordings with errors beyond 3 sigma_total (or, with --clean, beyond 4 sigmas of noise), and
+the NEES per parameter with the total covariance.
 """
 import argparse
 import os
@@ -207,6 +207,11 @@ def run(options, seed):
             yaml.safe_dump(scenario, file)
         subprocess.run([options.camgyro, "simulate", folder + "/scenario.yaml", *options.changes,
                         "--out", recording], check=True, stdout=subprocess.DEVNULL)
+        if options.undeclared:
+            with open(recording + "/imu0/sensor.yaml", encoding="utf-8") as file:
+                lines = [line for line in file if "gyroscope_noise_density" not in line]
+            with open(recording + "/imu0/sensor.yaml", "w", encoding="utf-8") as file:
+                file.writelines(lines)
         if options.stream:
             command = [options.stream, recording, out]
         else:
@@ -281,6 +286,7 @@ def main():
     parser.add_argument("--strange", action="store_true")
     parser.add_argument("--rendered", action="store_true")
     parser.add_argument("--attitudes", action="store_true")
+    parser.add_argument("--undeclared", action="store_true")
     parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--effects", metavar="LIST")
     parser.add_argument("--stream", metavar="PREPARE_VIO")

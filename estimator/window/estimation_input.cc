@@ -1,12 +1,10 @@
 #include "estimator/window/estimation_input.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <utility>
 
-#include "core/robust_statistics.h"
 #include "core/saturation.h"
 #include "core/time.h"
 
@@ -150,31 +148,6 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   }
   setup.accel = std::move(accel);
   return setup;
-}
-
-Eigen::Vector3d GyroSigma(const Recording& recording, double delay_s) {
-  const double interval = MedianInterval(recording.gyro);
-  if (recording.gyro_info.noise_density_rad_s_rtHz && interval > 0.0) {
-    return Eigen::Vector3d::Constant(*recording.gyro_info.noise_density_rad_s_rtHz /
-                                     std::sqrt(interval));
-  }
-  std::array<std::vector<double>, 3> differences;
-  const auto& gyro = recording.gyro;
-  const int64_t first = StampAt(recording.frames.front().stamp_ns, delay_s);
-  const int64_t last = StampAt(recording.frames.back().stamp_ns, delay_s);
-  for (size_t i = 3; i < gyro.size(); ++i) {
-    if (gyro[i - 3].stamp_ns < first || gyro[i].stamp_ns > last) continue;
-    const Eigen::Vector3d d = gyro[i].omega_gyro_rad_s - 3.0 * gyro[i - 1].omega_gyro_rad_s +
-                              3.0 * gyro[i - 2].omega_gyro_rad_s - gyro[i - 3].omega_gyro_rad_s;
-    for (size_t k = 0; k < 3; ++k) differences[k].push_back(d[static_cast<int>(k)]);
-  }
-  Eigen::Vector3d sigma;
-  // Third differences of white noise have a variance of 1 + 9 + 9 + 1.
-  for (int k = 0; k < 3; ++k) {
-    sigma[k] = std::clamp(RobustScale({differences[static_cast<size_t>(k)]}, 0) / std::sqrt(20.0),
-                          5e-4, 2e-2);
-  }
-  return sigma;
 }
 
 }  // namespace camgyro

@@ -42,11 +42,6 @@ double FirstDelayOf(const Calibration& calibration, const FrameTime& frame);
 // What effects may know of a recording, with what a calibration says of it so far.
 EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calibration);
 
-// White noise of one gyro sample per axis [rad/s]: as declared, else what the samples show while
-// the camera ran (third differences, robust), within [5e-4, 2e-2]. What vibration and sampling add
-// is not in it.
-Eigen::Vector3d GyroSigma(const Recording& recording, double delay_s);
-
 }  // namespace camgyro
 
 #endif  // CAMGYRO_ESTIMATOR_WINDOW_ESTIMATION_INPUT_H_

@@ -12,6 +12,7 @@
 
 #include "estimator/moving_tracks.h"
 #include "estimator/reference/calibrate_with_ekf.h"
+#include "estimator/window/gyro_noise.h"
 #include "estimator/window/refinement.h"
 #include "estimator/window/sliding_window.h"
 

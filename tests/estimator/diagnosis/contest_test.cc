@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "estimator/window/gyro_noise.h"
 #include "tests/estimator/simulated_input.h"
 
 namespace camgyro {

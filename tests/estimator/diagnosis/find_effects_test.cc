@@ -4,6 +4,7 @@
 #include "core/so3.h"
 #include "core/standard_distortion.h"
 #include "estimator/diagnosis/diagnose.h"
+#include "estimator/window/gyro_noise.h"
 #include "simulation/simulate.h"
 
 namespace camgyro {

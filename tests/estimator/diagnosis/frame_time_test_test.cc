@@ -11,6 +11,7 @@
 #include "core/so3.h"
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/thresholds.h"
+#include "estimator/window/gyro_noise.h"
 #include "simulation/simulate.h"
 
 namespace camgyro {

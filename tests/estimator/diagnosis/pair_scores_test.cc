@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/score_test.h"
+#include "estimator/window/gyro_noise.h"
 #include "simulation/simulate.h"
 
 namespace camgyro {

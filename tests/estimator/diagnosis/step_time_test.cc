@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/effects/catalogue.h"
+#include "estimator/window/gyro_noise.h"
 #include "simulation/simulate.h"
 
 namespace camgyro {

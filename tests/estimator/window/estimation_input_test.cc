@@ -78,20 +78,6 @@ TEST(EstimationInput, OutlineKnowsTheNumbersAndMakesTheMatchesOfChosenPairs) {
   }
 }
 
-TEST(GyroSigma, IsWhatTheSamplesShowOrTheFileDeclares) {
-  Scenario scenario = ShortScenario(4.0);
-  Simulated s = SimulateTracks(scenario).value();
-  s.recording.gyro_info.noise_density_rad_s_rtHz.reset();
-  // 2.1e-4 rad/s/rtHz at 200 Hz.
-  const double expected = 2.1e-4 * std::sqrt(200.0);
-  const Eigen::Vector3d shown = GyroSigma(s.recording, s.truth.delay_s);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(shown[k], expected, 0.15 * expected);
-  s.recording.gyro_info.noise_density_rad_s_rtHz = 5e-4;
-  EXPECT_LT(
-      (GyroSigma(s.recording, 0.0) - Eigen::Vector3d::Constant(5e-4 * std::sqrt(200.0))).norm(),
-      1e-6);
-}
-
 TEST(SideBySide, LeavesPairsOutThatOverlap) {
   const Recording recording = SimulateTracks(ShortScenario(1.0))->recording;
   const EstimationInput input = MakeEstimationInput(recording, {5, 2});

@@ -14,6 +14,7 @@
 #include "core/so3.h"
 #include "core/time.h"
 #include "estimator/reference/implicit_ekf.h"
+#include "estimator/window/gyro_noise.h"
 #include "simulation/simulate.h"
 
 namespace camgyro::comparison {
