@@ -109,7 +109,9 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
         Format("the readout time of %.1f ms is longer than the frame interval of %.1f ms",
                1e3 * c.readout_s, 1e3 * interval));
   }
-  if (report->unseen && report->unseen->rms_px > 1.3 * report->quality.rms_px) {
+  // Beyond what a noisy gyro turns.
+  if (report->unseen && std::pow(report->unseen->rms_px, 2) - std::pow(report->unseen->gyro_px, 2) >
+                            std::pow(1.3 * report->quality.rms_px, 2)) {
     report->doubts.push_back(
         Format("frames that the fit has not seen fit worse: %.3f px against %.3f px",
                report->unseen->rms_px, report->quality.rms_px));

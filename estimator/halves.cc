@@ -70,9 +70,13 @@ Halves FitHalves(const EstimationInput& input, const std::vector<TimedPair>& pai
   UnseenFit unseen;
   for (const auto& other : others) {
     if (!other) continue;
-    unseen.rms_px = std::sqrt((unseen.matches * unseen.rms_px * unseen.rms_px +
-                               other->matches * other->rms_px * other->rms_px) /
-                              std::max(1, unseen.matches + other->matches));
+    const auto together = [&](double UnseenFit::*rms_px) {
+      unseen.*rms_px = std::sqrt((unseen.matches * std::pow(unseen.*rms_px, 2) +
+                                  other->matches * std::pow((*other).*rms_px, 2)) /
+                                 std::max(1, unseen.matches + other->matches));
+    };
+    together(&UnseenFit::rms_px);
+    together(&UnseenFit::gyro_px);
     unseen.matches += other->matches;
     unseen.pairs += other->pairs;
   }

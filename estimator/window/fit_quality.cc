@@ -37,10 +37,18 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
       of_pairs[i] = std::move(residuals);
     }
   });
+  double seconds = 0.0;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (!of_pairs[i]) continue;
     ++fit.pairs;
+    seconds += pairs[i].time_b_s - pairs[i].time_a_s;
     sum.Add(*of_pairs[i], pairs[i].noise_factor);
+  }
+  if (fit.pairs > 0 && input.rates.size() > 1) {
+    const double interval_s = (input.rates.back().time_s - input.rates.front().time_s) /
+                              static_cast<double>(input.rates.size() - 1);
+    fit.gyro_px = std::sqrt(seconds / fit.pairs * interval_s) * calibration.lens[kFocal] *
+                  options.gyro_sigma_rad_s.mean();
   }
   fit.matches = sum.matches();
   fit.rms_px = noise_px * sum.rms();

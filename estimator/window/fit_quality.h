@@ -48,6 +48,9 @@ struct UnseenFit {
   int pairs = 0;
   int matches = 0;
   double rms_px = 0.0;  // bounded by the loss, as FitQuality::rms_px
+  // What the gyro's noise may turn such pairs by (rms): it is in rms_px for the most part, and a
+  // fit has it in its rates.
+  double gyro_px = 0.0;
 };
 UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                          const Calibration& calibration, double noise_px,

@@ -42,6 +42,22 @@ TEST(Doubts, NothingIsBelievedOfAFocalLengthThatNoLensHas) {
   }
 }
 
+TEST(Doubts, UnseenFramesThatFitWorseBeyondTheGyrosNoise) {
+  const simulation::Simulated s = simulation::SimulateTracks(ShortScenario(1.0)).value();
+  const auto doubts_of = [&](double unseen_px, double gyro_px) {
+    CalibrationReport report;
+    report.converged = true;
+    report.calibration = s.truth;
+    report.quality.rms_px = 0.5;
+    report.unseen = UnseenFit{100, 5000, unseen_px, gyro_px};
+    AddDoubts(s.recording, &report);
+    return report.doubts;
+  };
+  EXPECT_THAT(doubts_of(0.6, 0.0), ::testing::IsEmpty());
+  EXPECT_THAT(doubts_of(0.8, 0.1), ::testing::ElementsAre(::testing::HasSubstr("fit worse")));
+  EXPECT_THAT(doubts_of(0.8, 0.7), ::testing::IsEmpty());
+}
+
 // A gimbal's camera ended with 4013 ± 2217 px and a readout of 0.4 ± 0.3 ms, which is 10 or more;
 // in the middle row its delay is right.
 TEST(Doubts, WithoutAReadoutTheDelayOfTheFirstRowIsUnknown) {

@@ -48,6 +48,24 @@ TEST(EvaluateUnseen, IsTheNoiseAtTheTruthAndMoreElsewhere) {
   EXPECT_NEAR(EvaluateUnseen(late, input.pairs, s.truth, 0.7, {}).pairs, 60, 2);
 }
 
+// A fit has the gyro's noise in its rates; unseen pairs are turned by it.
+TEST(EvaluateUnseen, KnowsWhatANoisyGyroTurns) {
+  simulation::Scenario scenario = ShortScenario(4.0);
+  const auto unseen = [&](double density) {
+    scenario.gyro.noise_density_rad_s_rtHz = density;
+    const Simulated s = SimulateTracks(scenario).value();
+    const EstimationInput input = MakeEstimationInput(s.recording);
+    PairGraphOptions options;
+    options.gyro_sigma_rad_s.setConstant(density * std::sqrt(200.0));
+    const UnseenFit fit = EvaluateUnseen(input, input.pairs, s.truth, 0.7, options);
+    EXPECT_NEAR(fit.gyro_px, s.truth.lens[kFocal] * density * std::sqrt(1.0 / 30.0), 0.01);
+    return fit;
+  };
+  const UnseenFit good = unseen(1e-4), noisy = unseen(8e-3);
+  EXPECT_GT(noisy.rms_px, 1.1 * good.rms_px);
+  EXPECT_LT(std::pow(noisy.rms_px, 2) - std::pow(noisy.gyro_px, 2), std::pow(good.rms_px, 2));
+}
+
 TEST(EvaluateUnseen, OfTransfersIsTheNoiseAtTheTruthAndMoreElsewhere) {
   const Simulated s = SimulateTracks(FarScenario(4.0)).value();
   const EstimationInput input = MakeEstimationInput(s.recording);
