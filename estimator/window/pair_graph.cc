@@ -40,7 +40,8 @@ PairGraph::PairGraph(const Calibration& start, const Prior& prior, const PairGra
       prior_mean_(prior.mean),
       effect_prior_sigma_(prior.effect_sigma),
       effects_(WithParameters(start)),
-      rates_(options, prior, start.bias_gyro_rad_s, effects_),
+      rates_(options, prior, start.bias_gyro_rad_s, effects_,
+             start_ != nullptr ? &start_->rates : nullptr),
       turn_sigma_rad_s_(options.turn_sigma_rad_s) {
   prior_mean_.effects = start.effects;
   const bool held = options.hold_shared;
@@ -199,7 +200,8 @@ AddPairResult PairGraph::AddPair(const TimedPair& timed) {
   AddFrameTimes(timed, &pair);
   MakeFactor(timed.id, &pair);
   pairs_.emplace(timed.id, std::move(pair));
-  if (facts.has_direction) Residuals(timed.id, /*search=*/true);
+  const bool is_known = start_ != nullptr && start_->planes.count(timed.id) > 0;
+  if (facts.has_direction && !is_known) Residuals(timed.id, /*search=*/true);
   return AddPairResult::kAdded;
 }
 

@@ -56,6 +56,7 @@ struct CrossFit {
 struct PairLatents {
   std::map<int64_t, PairPlane> planes;      // by pair
   std::map<int64_t, double> frame_times_s;  // by PairGraph::FrameNumber
+  RatesFound rates;
 };
 
 class PairGraph {
@@ -136,6 +137,7 @@ class PairGraph {
   // What frames' own times may share, beyond what their spread allows for: it is in the covariance
   // of the delay from now on [s^2].
   void SetSharedFrameTime(double variance_s2) { shared_frame_time_s2_ = variance_s2; }
+  std::map<int64_t, double> OwnTimes() const;  // [s], by FrameNumber
   PairLatents Latents() const;
 
   // The estimate. With covariance: of the present graph, inflated by the clustered (sandwich)

@@ -137,15 +137,24 @@ Calibration PairGraph::Estimate() const {
 
 PairLatents PairGraph::Latents() const {
   PairLatents latents;
+  latents.rates = rates_.Found(graph_);
   for (const auto& [id, pair] : pairs_) {
     if (residual().facts().has_direction) {
       latents.planes[id] = {graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
     }
-    for (const int64_t frame : pair.frame_times) {
-      latents.frame_times_s[frame] = graph_.value(FrameTimeBlock(frame))[0];
+  }
+  latents.frame_times_s = OwnTimes();
+  return latents;
+}
+
+std::map<int64_t, double> PairGraph::OwnTimes() const {
+  std::map<int64_t, double> times_s;
+  for (const auto& entry : pairs_) {
+    for (const int64_t frame : entry.second.frame_times) {
+      times_s[frame] = graph_.value(FrameTimeBlock(frame))[0];
     }
   }
-  return latents;
+  return times_s;
 }
 
 Eigen::VectorXd PairGraph::DelayByEffects(const FrameTime& frame) const {

@@ -68,12 +68,14 @@ int PairGraphOptions::RateStep(double interval_s, double focal_px) const {
 }
 
 RateGroups::RateGroups(const PairGraphOptions& options, const Prior& prior,
-                       const Eigen::Vector3d& start_bias, std::shared_ptr<const EffectSet> effects)
+                       const Eigen::Vector3d& start_bias, std::shared_ptr<const EffectSet> effects,
+                       const RatesFound* start)
     : options_(options),
       prior_bias_(prior.mean.bias_gyro_rad_s),
       prior_bias_sigma_(prior.sigma.segment<3>(kStateBias)),
       start_bias_(start_bias),
-      effects_(std::move(effects)) {}
+      effects_(std::move(effects)),
+      start_(start) {}
 
 void RateGroups::Add(const TimedRate& rate) {
   if (!samples_.empty()) CHECK_GT(rate.time_s, samples_.back().time_s);
@@ -177,6 +179,41 @@ AddPairResult RateGroups::Plan(double from_s, double to_s, int step, const Facto
   return AddPairResult::kAdded;
 }
 
+Eigen::Vector3d RateGroups::StartingCorrection(int64_t first, int count) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  if (start_ == nullptr) return sum;
+  for (int64_t i = first; i < first + count; ++i) {
+    const double time_s = sample(i).time_s;
+    const auto after = std::upper_bound(
+        start_->corrections.begin(), start_->corrections.end(), time_s,
+        [](double t, const RatesFound::Correction& correction) { return t < correction.first_s; });
+    if (after == start_->corrections.begin()) continue;
+    const RatesFound::Correction& correction = *std::prev(after);
+    if (time_s <= correction.last_s) sum += correction.value_rad_s;
+  }
+  return sum / count;
+}
+
+RatesFound RateGroups::Found(const FactorGraph& graph) const {
+  RatesFound found;
+  for (const auto& [id, group] : groups_) {
+    const Factor& reading = graph.factors().at(group.factor);
+    std::vector<const double*> values;
+    for (const BlockId& block : reading.blocks) values.push_back(graph.value(block).data());
+    Eigen::Matrix3Xd residuals(3, reading.cost->num_residuals() / 3);
+    if (!reading.cost->Evaluate(values.data(), residuals.data(), nullptr)) continue;
+    for (int k = 0; k < residuals.cols(); ++k) {
+      const int64_t first = group.first_sample + k * group.step;
+      const int count = std::min(group.step, group.count - k * group.step);
+      found.corrections.push_back({sample(first).time_s, sample(first + count - 1).time_s,
+                                   residuals.col(k).cwiseProduct(options_.gyro_sigma_rad_s) /
+                                       std::sqrt(static_cast<double>(count))});
+    }
+    found.biases_rad_s[group.bias_index] = graph.value(BiasBlock(group.bias_index));
+  }
+  return found;
+}
+
 void RateGroups::PlanGroup(int64_t first, int64_t last, const FactorGraph& graph,
                            Cover* cover) const {
   Group& group = cover->group;
@@ -184,6 +221,7 @@ void RateGroups::PlanGroup(int64_t first, int64_t last, const FactorGraph& graph
   cover->groups.push_back(next_group_);
   group.first_sample = first;
   group.count = static_cast<int>(last + 1 - first);
+  group.step = cover->step;
   group.bias_index =
       static_cast<int64_t>(std::floor(sample(first).time_s / options_.bias_interval_s));
   const Eigen::Vector3d bias = BiasAt(group.bias_index, graph);
@@ -212,13 +250,18 @@ void RateGroups::PlanGroup(int64_t first, int64_t last, const FactorGraph& graph
       samples.push_back(count);
     }
     group.base = rates;
-    cover->values = Eigen::VectorXd::Zero(means.size());
+    Eigen::Matrix3Xd values(3, means.cols());
+    for (int k = 0; k < values.cols(); ++k) {
+      values.col(k) = StartingCorrection(first + k * cover->step, samples[static_cast<size_t>(k)]);
+    }
+    cover->values = values.reshaped();
     cover->reading = cover->reading_has_effects
                          ? std::make_shared<GyroRate>(means, samples, options_.gyro_sigma_rad_s,
                                                       effects_, std::move(times_s), rates)
                          : std::make_shared<GyroRate>(means, samples, options_.gyro_sigma_rad_s);
     return;
   }
+  for (int i = 0; i < group.count; ++i) rates.col(i) += StartingCorrection(first + i, 1);
   cover->values = Eigen::Map<const Eigen::VectorXd>(rates.data(), rates.size());
   cover->reading = cover->reading_has_effects
                        ? std::make_shared<GyroRate>(measured, options_.gyro_sigma_rad_s, effects_,
@@ -248,6 +291,10 @@ BlockId RateGroups::BiasBefore(int64_t index, const FactorGraph& graph) {
 
 Eigen::Vector3d RateGroups::BiasAt(int64_t index, const FactorGraph& graph) const {
   if (graph.Has(BiasBlock(index))) return graph.value(BiasBlock(index));
+  if (start_ != nullptr) {
+    const auto known = start_->biases_rad_s.find(index);
+    if (known != start_->biases_rad_s.end()) return known->second;
+  }
   const BlockId before = BiasBefore(index, graph);
   return before.kind == BlockKind::kBias ? Eigen::Vector3d(graph.value(before)) : start_bias_;
 }

@@ -36,11 +36,24 @@ double NeglectedPx(const std::vector<TimedRate>& rates, const PairGraphOptions& 
                    double focal_px, const EffectSet& effects, const Eigen::VectorXd& from,
                    const Eigen::VectorXd& to);
 
+// What a fit has found of the gyro's rates.
+struct RatesFound {
+  // By how much rates are above the readings less bias and effects, in the mean over some samples:
+  // the gyro's noise.
+  struct Correction {
+    double first_s = 0.0, last_s = 0.0;  // the samples' times, as of TimedRate
+    Eigen::Vector3d value_rad_s = Eigen::Vector3d::Zero();
+  };
+  std::vector<Correction> corrections;              // in time order
+  std::map<int64_t, Eigen::Vector3d> biases_rad_s;  // by the number of the interval
+};
+
 class RateGroups {
  public:
   struct Group {
     int64_t first_sample = 0;  // absolute sample number
     int count = 0;
+    int step = 1;  // samples of a value
     int64_t bias_index = 0;
     FactorGraph::FactorKey factor = 0;
     Eigen::Matrix3Xd base;  // see PairMeasurement::rate_base; empty with a step of 1
@@ -62,8 +75,10 @@ class RateGroups {
 
   // prior: of it, mean and sigma of the bias. start_bias: value of the first block. effects: null
   // without parameters.
+  // start: of another fit, where rates and biases begin; read while groups are added. Null, and
+  // where it has none: as the gyro reads.
   RateGroups(const PairGraphOptions& options, const Prior& prior, const Eigen::Vector3d& start_bias,
-             std::shared_ptr<const EffectSet> effects);
+             std::shared_ptr<const EffectSet> effects, const RatesFound* start = nullptr);
 
   // In time order (CHECKed).
   void Add(const TimedRate& rate);
@@ -88,6 +103,7 @@ class RateGroups {
   void Drop(const std::vector<int64_t>& ids);
 
   const std::map<int64_t, Group>& groups() const { return groups_; }
+  RatesFound Found(const FactorGraph& graph) const;
   double StartOf(const Group& group) const { return sample(group.first_sample).time_s; }
   const Eigen::Vector3d& start_bias() const { return start_bias_; }
 
@@ -99,6 +115,8 @@ class RateGroups {
   Eigen::Vector3d ChainRateOf(int64_t number) const;
   // First and last sample that an interval needs.
   AddPairResult FindSamples(double from_s, double to_s, int64_t* first, int64_t* last) const;
+  // That which some samples begin with, in the mean.
+  Eigen::Vector3d StartingCorrection(int64_t first, int count) const;
   void PlanGroup(int64_t first, int64_t last, const FactorGraph& graph, Cover* cover) const;
   // The bias block before an index, kLens if there is none.
   static BlockId BiasBefore(int64_t index, const FactorGraph& graph);
@@ -108,6 +126,7 @@ class RateGroups {
   const PairGraphOptions options_;
   const Eigen::Vector3d prior_bias_, prior_bias_sigma_, start_bias_;
   const std::shared_ptr<const EffectSet> effects_;
+  const RatesFound* const start_;
   std::deque<TimedRate> samples_;
   int64_t first_sample_ = 0;  // absolute number of samples_.front()
   double median_interval_s_ = 0.0;

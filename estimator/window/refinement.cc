@@ -171,13 +171,18 @@ class Refinement {
   }
 
  private:
-  // Rates are kept around the pairs as the delay was when they were added, the pairs' directions
-  // bend along what was read then, and the rates of the samples of one value differ as they did
-  // with the effects of then.
+  // Rates are kept around the pairs as the delay and the spread of the frames' times were when they
+  // were added, the pairs' directions bend along what was read then, and the rates of the samples
+  // of one value differ as they did with the effects of then.
   bool IsBuiltForOthers(const Calibration& now) const {
     constexpr double kTurnedScan = 0.2;  // of the readout: bends are small
     if (LargestShift(pairs_, now, built_at_) > 0.5 * graph_options_.rate_margin_s) return true;
     if (TurnOfScan(pairs_.front(), now, built_at_) > kTurnedScan) return true;
+    constexpr double kGrownSpread = 1.5;  // of six spreads, four are left then (RateMargin)
+    if (graph_->has_frame_times() &&
+        graph_->frame_time_spread_s() > kGrownSpread * built_at_spread_s_) {
+      return true;
+    }
     if (now.effects == nullptr || facts_.of_attitudes) return false;
     return NeglectedPx(input_.rates, graph_options_, built_at_.lens[kFocal], *now.effects,
                        built_at_.effect_values, now.effect_values) > graph_options_.rate_step_px;
@@ -194,8 +199,12 @@ class Refinement {
                       KeptBytes(pairs_, graph_options_) <= options_.most_kept_bytes;
     graph_options_.keep_within_sigmas = keep ? 0.0 : -1.0;
     built_at_ = result_.calibration;
-    graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_,
-                                         result_.rounds == 1 ? options_.latents : nullptr);
+    std::shared_ptr<const PairLatents> latents = options_.latents;
+    if (graph_ != nullptr) {  // directions and rates have come with what was wrong
+      latents = std::make_shared<PairLatents>(PairLatents{{}, graph_->OwnTimes(), {}});
+    }
+    graph_ = std::make_unique<PairGraph>(built_at_, prior_, graph_options_, std::move(latents));
+    if (graph_->has_frame_times()) built_at_spread_s_ = graph_->frame_time_spread_s();
     for (const TimedRate& rate : input_.rates) graph_->AddRate(rate);
     result_.skipped_pairs = 0;
     for (const TimedPair& pair : pairs_) {
@@ -286,8 +295,8 @@ class Refinement {
     }
     Calibration last = graph_->Estimate();
     if (options_.frame_times_alone && !result_.frame_times.empty()) {  // from the second round on
-      options.settled = [this, last_s = graph_->Latents().frame_times_s]() mutable {
-        auto now_s = graph_->Latents().frame_times_s;
+      options.settled = [this, last_s = graph_->OwnTimes()]() mutable {
+        auto now_s = graph_->OwnTimes();
         const bool settled = FrameTimesHaveSettled(result_.frame_times, last_s, now_s);
         last_s = std::move(now_s);
         return settled;
@@ -354,6 +363,7 @@ class Refinement {
   std::unique_ptr<PairGraph> graph_;
   std::vector<int64_t> ids_;
   Calibration built_at_;
+  double built_at_spread_s_ = 0.0;
   Noise noise_now_;
   bool scale_settled_ = false, solved_finely_ = false;
   std::optional<Yardstick> yardstick_;

@@ -177,8 +177,6 @@ TEST(Refinement, GoesOnFromAnotherFit) {
   EXPECT_LT(moved.cwiseQuotient(fit->calibration.sigma()).cwiseAbs().maxCoeff(), 0.3);
 }
 
-// Motion blur: noise along the motion five times that across. Taken for alike in all directions,
-// the correction for errors in variables is wrong; the factor makes it right.
 // Asked from the second round on. What there is then has its covariance and its quality.
 TEST(Refinement, EndsWhereItIsLost) {
   const Simulated s = SimulateTracks(ShortScenario(4.0)).value();
@@ -201,6 +199,8 @@ TEST(Refinement, EndsWhereItIsLost) {
   }
 }
 
+// Motion blur: noise along the motion five times that across. Taken for alike in all directions,
+// the correction for errors in variables is wrong; the factor makes it right.
 TEST(Refinement, NoiseAlongTheMotionIsNoBiasIfItIsKnown) {
   Scenario scenario = ShortScenario(10.0);
   scenario.tracks.count = 100;
