@@ -1,7 +1,5 @@
 #include "estimator/window/estimation_input.h"
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
 #include <utility>
 

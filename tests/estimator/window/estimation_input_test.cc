@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <set>
 #include <vector>
 
@@ -13,7 +12,6 @@
 namespace camgyro {
 namespace {
 
-using simulation::Scenario;
 using simulation::Simulated;
 using simulation::SimulateTracks;
 
