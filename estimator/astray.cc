@@ -10,6 +10,7 @@
 #include "estimator/residual_table.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/starting_point.h"
+#include "estimator/window/gyro_noise.h"
 #include "estimator/window/smooth_motion.h"
 
 namespace camgyro {
@@ -71,8 +72,9 @@ double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
   const std::vector<MatchResidual> rows = ComputeResiduals(input, pairs, fit, noise_px, options);
   const Eigen::Vector2d size_px(fit.width_px, fit.height_px);
   // A gyro's noise turns the whole picture, too: what it may leave of each pair, of its length.
-  const double per_second_px2 = std::pow(fit.lens[kFocal] * options.gyro_sigma_rad_s.mean(), 2) *
-                                MedianInterval(recording.gyro);
+  const double per_second_px2 =
+      std::pow(fit.lens[kFocal], 2) *
+      TurnVariancePerS(options.gyro_sigma_rad_s, MedianInterval(recording.gyro));
   const double interval_s = MedianInterval(recording.frames);
   double of_gyro_px2 = 0.0;
   LeftOver sum;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "estimator/window/gyro_noise.h"
 #include "estimator/window/residuals/pair_residual.h"
 #include "factors/robust.h"
 
@@ -47,8 +48,9 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
   if (fit.pairs > 0 && input.rates.size() > 1) {
     const double interval_s = (input.rates.back().time_s - input.rates.front().time_s) /
                               static_cast<double>(input.rates.size() - 1);
-    fit.gyro_px = std::sqrt(seconds / fit.pairs * interval_s) * calibration.lens[kFocal] *
-                  options.gyro_sigma_rad_s.mean();
+    fit.gyro_px =
+        calibration.lens[kFocal] *
+        std::sqrt(seconds / fit.pairs * TurnVariancePerS(options.gyro_sigma_rad_s, interval_s));
   }
   fit.matches = sum.matches();
   fit.rms_px = noise_px * sum.rms();

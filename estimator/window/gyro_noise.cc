@@ -75,4 +75,8 @@ Eigen::Vector3d GyroSigma(const Recording& recording, double delay_s) {
   return ShownGyroSigma(recording, delay_s);
 }
 
+double TurnVariancePerS(const Eigen::Vector3d& sigma_rad_s, double interval_s) {
+  return sigma_rad_s.squaredNorm() / 3.0 * interval_s;
+}
+
 }  // namespace camgyro

@@ -19,6 +19,10 @@ Eigen::Vector3d ShownGyroSigma(const Recording& recording, double delay_s);
 // White noise of one gyro sample per axis [rad/s]: as declared, else what the samples show.
 Eigen::Vector3d GyroSigma(const Recording& recording, double delay_s);
 
+// Variance of the turn about one axis that such noise adds up to in a second, mean of the axes
+// [rad^2 / s]. interval_s: of the samples.
+double TurnVariancePerS(const Eigen::Vector3d& sigma_rad_s, double interval_s);
+
 }  // namespace camgyro
 
 #endif  // CAMGYRO_ESTIMATOR_WINDOW_GYRO_NOISE_H_

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/robust_statistics.h"
+#include "estimator/window/gyro_noise.h"
 
 namespace camgyro {
 
@@ -22,7 +23,7 @@ NoiseScale::NoiseScale(const PairResidual::Facts& residual, const EstimationInpu
   for (const TimedPair& pair : pairs) gaps.push_back(pair.time_b_s - pair.time_a_s);
   const double interval_s = (input.rates.back().time_s - input.rates.front().time_s) /
                             static_cast<double>(input.rates.size() - 1);
-  gyro_variance_ = gyro_sigma_rad_s.squaredNorm() / 3.0 * interval_s * MedianInPlace(&gaps);
+  gyro_variance_ = TurnVariancePerS(gyro_sigma_rad_s, interval_s) * MedianInPlace(&gaps);
   least_ = kLeastShareOfGyro * std::sqrt(gyro_variance_);
 }
 
