@@ -177,6 +177,26 @@ TEST(Refinement, GoesOnFromAnotherFit) {
   EXPECT_LT(moved.cwiseQuotient(fit->calibration.sigma()).cwiseAbs().maxCoeff(), 0.3);
 }
 
+// Frames that are later than the rates around their pairs reach: the fit is made anew with more.
+TEST(Refinement, KeepsRatesForFramesThatAreFarOffTheirStamps) {
+  Scenario scenario = ShortScenario(6.0);
+  scenario.effects.frame_stamp_jitter.spread_s = 12e-3;
+  const Simulated s = SimulateTracks(scenario).value();
+  const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  const Prior prior = StartOffTheTruth(s.truth);
+  Calibration start = s.truth;
+  start.effects = std::make_shared<const EffectSet>(
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+  double noise_px[2] = {};
+  for (const bool known : {false, true}) {
+    start.effect_values = Eigen::VectorXd::Constant(1, known ? 12e-3 : 1e-3);
+    const Result<Refined> fit = Refine(input, input.pairs, start, prior, {});
+    ASSERT_TRUE(fit.has_value()) << fit.error().message;
+    noise_px[known ? 1 : 0] = fit->quality.noise_px;
+  }
+  EXPECT_LT(noise_px[0], 1.01 * noise_px[1]);  // held rates: 1.02
+}
+
 // Asked from the second round on. What there is then has its covariance and its quality.
 TEST(Refinement, EndsWhereItIsLost) {
   const Simulated s = SimulateTracks(ShortScenario(4.0)).value();
