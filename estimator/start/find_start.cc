@@ -222,6 +222,15 @@ void SearchAllAlignments(const Streams& s, const StartOptions& options, LagSearc
 
 }  // namespace
 
+double UsualInterval(const Recording& recording) {
+  return std::min(1.0 / 30.0, MedianInterval(recording.frames));
+}
+
+StartReadout UsualReadout(const Recording& recording) {
+  const double interval_s = UsualInterval(recording);
+  return {0.5 * interval_s, 0.3 * interval_s, /*determined=*/false};
+}
+
 RoughAlignment RoughlyAligned(const StartResult& start, double readout_s) {
   return {start.q_gyro_cam, start.bias_gyro_rad_s, start.delay_middle_row_s, start.clock_skew,
           readout_s};

@@ -42,7 +42,9 @@ struct FocalResidual {
 struct StartFocal {
   double value_px = 0.0;
   double sigma_px = 0.0;
-  // Sigma below 10 % and a distinct minimum; else value_px is the recording's guess or a usual one.
+  // Sigma below kDetermined and a distinct minimum; else value_px is the recording's guess or a
+  // usual one.
+  static constexpr double kDetermined = 0.1;  // of the focal length
   bool determined = false;
   // Residual of the best point / best residual more than 25 % away, 0..1: near 1, the motion does
   // not tell one field of view from the other.
@@ -56,6 +58,13 @@ struct StartReadout {
   // Sigma below 15 % of the frame interval and a distinct minimum; else value_s is what is usual.
   bool determined = false;
 };
+
+// What is taken where nothing tells: half of the frame interval, give or take what leaves out
+// neither a global shutter nor one that reads all the time.
+StartReadout UsualReadout(const Recording& recording);
+
+// The frame interval, but not more than that of 30 frames/s: pictures are read no slower [s].
+double UsualInterval(const Recording& recording);
 
 // What rotations tell of a lens that follows the camera's turns (stabiliser_search.h).
 struct StartStabiliser {

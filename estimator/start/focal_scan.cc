@@ -21,7 +21,6 @@ namespace camgyro {
 namespace {
 
 constexpr double kMedianNorm2 = 1.177;  // median norm of 2 normal variables of sigma 1
-constexpr double kDeterminedLog = 0.1;  // sigma of log f
 constexpr double kDistinctLog = 0.22;   // 25 %
 constexpr double kMaxRunnerUp = 0.8;    // a wrong lens moves shallow minima far
 constexpr double kModelLog = 0.02;      // a lens that nothing declares bends it further
@@ -29,10 +28,7 @@ constexpr double kUnknownLog = 0.3;     // what is known of any lens
 // Directions of the orientation that a motion determines which tells a focal length: one about a
 // single axis of the picture determines two.
 constexpr int kLeastAxes = 2;
-// Parts of the frame interval: what is taken where nothing tells, and its sigma; the largest sigma
-// of what is told.
-constexpr double kUsualReadout = 0.5;
-constexpr double kUnknownReadout = 0.3;
+// Of the frame interval: the largest sigma of what is told.
 constexpr double kDeterminedReadout = 0.15;
 constexpr double kModelReadout = 0.05;   // the loss is no parabola (docs/lab/start.md)
 constexpr double kLeastMatches = 15.0;   // of a pair that has a rotation
@@ -156,7 +152,7 @@ class FocalScan {
     focal.runner_up_ratio = curve.RunnerUpRatio(kDistinctLog);
     const auto [log_focal, spread_log] = curve.Minimum();
     const double sigma_log = std::hypot(spread_log, kModelLog);
-    focal.determined = sigma_log < kDeterminedLog && focal.runner_up_ratio < kMaxRunnerUp;
+    focal.determined = sigma_log < StartFocal::kDetermined && focal.runner_up_ratio < kMaxRunnerUp;
     best_focal_px_ = std::exp(log_focal);
     focal.value_px = std::exp(log_focal);
     focal.sigma_px = sigma_log * focal.value_px;
@@ -213,13 +209,15 @@ class FocalScan {
           return trial;
         },
         [this](ScanPoint* point) { MeasureMatches(recording_, point); });
-    StartReadout readout;
+    StartReadout readout = UsualReadout(recording_);
     auto [part, sigma] = curve.Minimum();
     sigma = std::hypot(sigma, kModelReadout);
     readout.determined =
         sigma < kDeterminedReadout && curve.RunnerUpRatio(1.5 * spacing) < kMaxRunnerUp;
-    readout.value_s = (readout.determined ? part : kUsualReadout) * interval_s_;
-    readout.sigma_s = (readout.determined ? sigma : kUnknownReadout) * interval_s_;
+    if (readout.determined) {
+      readout.value_s = part * interval_s_;
+      readout.sigma_s = sigma * interval_s_;
+    }
     rough_.readout_s = readout.value_s;
     return readout;
   }
@@ -227,10 +225,6 @@ class FocalScan {
   // The start at a focal length.
   Result<StartResult> StartAt(double focal_px) const {
     return FindStart(recording_, rotations_at_(recording_, {{focal_px, rough_}}).front(), options_);
-  }
-
-  static double UsualInterval(const Recording& recording) {
-    return std::min(1.0 / 30.0, MedianInterval(recording.frames));
   }
 
   std::vector<double> LogFocals() const {
@@ -261,8 +255,8 @@ class FocalScan {
       if (!near || (explained && near->explained <= *explained)) continue;
       if (explained) explained = near->explained;
       near_ = std::move(*near);
-      rough_ =
-          RoughlyAligned(near_, recording_.camera.readout_s.value_or(kUsualReadout * interval_s_));
+      rough_ = RoughlyAligned(
+          near_, recording_.camera.readout_s.value_or(UsualReadout(recording_).value_s));
       found = {};
     }
     return found;
