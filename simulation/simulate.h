@@ -15,18 +15,10 @@
 #include "simulation/camera.h"
 #include "simulation/scenario.h"
 #include "simulation/scene.h"
+#include "simulation/tracker.h"
 #include "simulation/trajectory.h"
 
 namespace camgyro::simulation {
-
-// What is true of one entry of Recording::tracks.
-struct PointTruth {
-  Eigen::Vector2d px;       // without noise
-  Eigen::Vector3d world_m;  // where the point was at its exposure
-  double time_s = 0.0;      // of its exposure, after the first gyro stamp
-  bool outlier = false;     // got a gross error
-  bool moving = false;      // not part of the static scene
-};
 
 struct FrameTruth {
   FrameTiming timing;
