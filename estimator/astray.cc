@@ -76,8 +76,11 @@ double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
       std::pow(fit.lens[kFocal], 2) *
       TurnVariancePerS(options.gyro_sigma_rad_s, MedianInterval(recording.gyro));
   const double interval_s = MedianInterval(recording.frames);
-  double of_gyro_px2 = 0.0;
-  LeftOver sum;
+  struct OfPair {
+    LeftOver left;
+    double of_gyro_px2;
+  };
+  std::vector<OfPair> of_pairs;
   for (auto begin = rows.begin(); begin != rows.end();) {
     std::vector<Eigen::Vector2d> places_px, corrections_px;
     auto row = begin;
@@ -87,11 +90,23 @@ double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
       corrections_px.push_back(row->correction_px);
     }
     if (const auto of_pair = SeparateSmooth(places_px, corrections_px, size_px)) {
-      sum.all += of_pair->all;
-      sum.unsmooth += of_pair->unsmooth;
-      of_gyro_px2 += per_second_px2 * interval_s * (begin->frame_b - begin->frame_a);
+      of_pairs.push_back(
+          {*of_pair, per_second_px2 * interval_s * (begin->frame_b - begin->frame_a)});
     }
     begin = row;
+  }
+  // A picture that is shown twice, or a frame that is late, is one pair's, not the model's: a pair
+  // may leave 10000 times what the others do.
+  constexpr double kWorst = 0.1;
+  std::sort(of_pairs.begin(), of_pairs.end(),
+            [](const OfPair& a, const OfPair& b) { return a.left.all < b.left.all; });
+  of_pairs.resize(of_pairs.size() - static_cast<size_t>(kWorst * of_pairs.size()));
+  LeftOver sum;
+  double of_gyro_px2 = 0.0;
+  for (const OfPair& pair : of_pairs) {
+    sum.all += pair.left.all;
+    sum.unsmooth += pair.left.unsmooth;
+    of_gyro_px2 += pair.of_gyro_px2;
   }
   const double all = std::max(std::min(sum.all, sum.unsmooth), sum.all - of_gyro_px2);
   return sum.unsmooth > 0.0 ? std::sqrt(all / sum.unsmooth) : 0.0;

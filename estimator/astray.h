@@ -35,11 +35,11 @@ bool IsFarFromRotations(double focal_px, const std::optional<StartFocal>& start)
 // nothing it is 1, but for chance. Nothing of such a fit is determined, whatever its sigmas.
 constexpr double kNoiseOfAstray = 1.5;
 
-// What a fit leaves (ComputeResiduals, of 100 pairs at most) over what it leaves without what is
-// smooth (SeparateSmooth), robust. 0 where nothing can be said: for recordings without pictures,
-// residuals without a direction of translation, and pairs with too few matches. The tracks' noise
-// is in both, whether it adds up from frame to frame or not; that of the gyro, which turns the
-// whole picture, is taken off what is smooth.
+// What a fit leaves (ComputeResiduals, of 100 pairs at most, without the tenth that leaves most)
+// over what it leaves without what is smooth (SeparateSmooth), robust. 0 where nothing can be said:
+// for recordings without pictures, residuals without a direction of translation, and pairs with too
+// few matches. The tracks' noise is in both, whether it adds up from frame to frame or not; that of
+// the gyro, which turns the whole picture, is taken off what is smooth.
 double NoiseOverSmooth(const Recording& recording, const EstimationInput& input,
                        const Calibration& fit, double noise_px, const PairGraphOptions& options);
 

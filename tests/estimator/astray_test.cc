@@ -94,6 +94,26 @@ TEST(Astray, ErrorsThatAddUpAreNotSmooth) {
   }
 }
 
+// Of a camera that shows pictures twice: a few of them do not make a fit wrong; many do.
+TEST(Astray, AFewPicturesThatRepeatProveNothing) {
+  simulation::Scenario scenario = ShortScenario(8.0);
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  scenario.scene.depth_m = {3.0, 6.0};
+  scenario.tracks.count = 90;
+  scenario.tracks.noise_px = 0.05;
+  const simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  const auto over_smooth = [&](size_t every) {
+    Recording repeating = s.recording;
+    for (size_t i = every; i < repeating.tracks.size(); i += every) {
+      repeating.tracks[i] = repeating.tracks[i - 1];
+    }
+    const EstimationInput input = OutlineOf(repeating, SelectPairs(repeating));
+    return NoiseOverSmooth(repeating, input, s.truth, scenario.tracks.noise_px, {});
+  };
+  EXPECT_NEAR(over_smooth(40), 1.0, 0.15);
+  EXPECT_GT(over_smooth(5), kNoiseOfAstray);
+}
+
 // Residuals are of the gyro's own rates, whose noise turns the whole picture.
 TEST(Astray, WhatANoisyGyroTurnsIsTakenOff) {
   simulation::Scenario scenario = ShortScenario(8.0);
