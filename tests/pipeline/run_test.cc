@@ -53,7 +53,8 @@ class FaultyRecording : public testing::Test {
     return *recording;
   }
 
-  // Calibrates the folder. Focal length, readout time and delay have to be within three sigmas.
+  // Calibrates the folder. Focal length, readout time and delay have to be determined, and within
+  // three sigmas.
   std::vector<RecordedFault> Calibrate() const {
     Result<Recording> recording = ReadRecording(folder_.string());
     if (!recording) {
@@ -70,8 +71,10 @@ class FaultyRecording : public testing::Test {
     EXPECT_TRUE(truth);
     const Calibration& found = run->report.calibration;
     const StateVector errors = Difference(found, *truth).cwiseQuotient(found.sigma());
-    for (const int i : {kStateFocal, kStateReadout, kStateDelay})
+    for (const int i : {kStateFocal, kStateReadout, kStateDelay}) {
       EXPECT_LT(std::abs(errors[i]), 3.0) << i;
+      EXPECT_TRUE(found.determined.at(static_cast<size_t>(i))) << i;
+    }
     return recording->faults;
   }
 
