@@ -178,14 +178,18 @@ Status OnlineCalibration::TryStart() {
 }
 
 void OnlineCalibration::ProcessWaiting() {
-  // Side by side, and without a common observation; see SelectPairs.
-  const size_t between = gap_ > 1 ? 1 : 0;
-  while (frames_.size() > static_cast<size_t>(gap_) + between) {
+  // Side by side, and without a common observation; see SelectPairs and kPairsInStep.
+  for (;;) {
+    const bool loses_step =
+        PairsLoseTheirStep(progress_.frame_stamps) && (pairs_begun_ + 1) % kPairsInStep == 0;
+    const size_t between = gap_ == 1 ? 0 : loses_step ? 2 : 1;
+    if (frames_.size() <= static_cast<size_t>(gap_) + between) break;
     const size_t gap = NextGap();
     if (!AddPair(frames_[0], frames_[gap])) {
       if (frames_.size() <= kMaxWaiting) break;
       ++skipped_here_;
     }
+    ++pairs_begun_;
     frames_.erase(frames_.begin(), frames_.begin() + static_cast<std::ptrdiff_t>(gap + between));
   }
   progress_.message = window_->failure().empty() ? "estimating" : window_->failure();

@@ -78,7 +78,8 @@ class OnlineCalibration {
   int64_t next_start_ns_ = 0;       // camera clock: no search before
   bool lacks_gyro_ = false;         // for the search that is due
   std::optional<SlidingWindow> window_;
-  int gap_ = 1;                                    // of the pairs, at most; see SelectPairs
+  int gap_ = 1;  // of the pairs, at most; see SelectPairs
+  uint64_t pairs_begun_ = 0;
   uint64_t used_before_ = 0, skipped_before_ = 0;  // by windows that were given up
   uint64_t skipped_here_ = 0;                      // frames that waited too long
   int64_t last_solved_ns_ = 0;                     // frame of the latest solved window

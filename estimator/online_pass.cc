@@ -11,7 +11,7 @@ OnlinePass::OnlinePass(const Recording& recording, const EstimationInput& input,
     : recording_(recording),
       input_(input),
       start_(start),
-      pairs_(SideBySide(OutlineOf(recording, selection).pairs)),
+      pairs_(SideBySide(recording, selection)),
       window_(start, prior, input.origin_ns, WindowOptionsFor(selection, options)) {
   window_.SetListener([this](const WindowUpdate& update) { trace_.push_back(update); });
 }

@@ -168,8 +168,8 @@ void WindowStep(benchmark::State& state) {
   for (const GyroSample& sample : s.recording.gyro) {
     CHECK(window.AddGyroSample(sample) == AddResult::kAccepted);
   }
-  const std::vector<TimedPair> pairs =
-      SideBySide(MakeEstimationInput(s.recording, SelectPairs(s.recording)).pairs);
+  std::vector<TimedPair> pairs = SideBySide(s.recording, SelectPairs(s.recording));
+  AddMatches(s.recording, &pairs);
   size_t next = 0;
   const auto step = [&] {
     CHECK_LT(next, pairs.size());

@@ -8,10 +8,18 @@
 
 namespace camgyro {
 
-std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs) {
+std::vector<TimedPair> SideBySide(const Recording& recording, const PairSelection& selection) {
+  const bool lose_step = selection.gap > 1 && PairsLoseTheirStep(recording.camera_stamps);
+  PairSelection from_any_frame = selection;
+  from_any_frame.stride = 1;
+  const int apart = selection.stride == selection.gap ? 0 : 1;  // see SelectPairs
   std::vector<TimedPair> kept;
-  for (const TimedPair& pair : pairs) {
-    if (kept.empty() || pair.time_a_s >= kept.back().time_b_s) kept.push_back(pair);
+  int next = 0;
+  for (TimedPair& pair : OutlineOf(recording, from_any_frame).pairs) {
+    if (pair.frame_a < next) continue;
+    kept.push_back(std::move(pair));
+    next = kept.back().frame_b + apart;
+    if (lose_step && kept.size() % kPairsInStep == 0) ++next;
   }
   return kept;
 }

@@ -31,8 +31,9 @@ EstimationInput OutlineOf(const Recording& recording, const PairSelection& selec
 std::vector<Match> MatchesOf(const Recording& recording, const TimedPair& pair);
 void AddMatches(const Recording& recording, std::vector<TimedPair>* pairs);
 
-// Pairs of which none begins before the one before ends, for estimators that go along.
-std::vector<TimedPair> SideBySide(const std::vector<TimedPair>& pairs);
+// An outline of pairs as of a selection of which none begins before the one before has ended, for
+// estimators that go along (kPairsInStep).
+std::vector<TimedPair> SideBySide(const Recording& recording, const PairSelection& selection);
 
 // The delay of a frame with the effects, in the middle of its picture; and at its first row and
 // column, whose delay t_d is [s].

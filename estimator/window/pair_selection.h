@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "core/recording.h"
@@ -23,6 +24,15 @@ struct PairSelection {
   // Odd gaps from every second frame have every frame; pairs one after the other have their ends.
   bool leaves_frames_out() const { return gap > 1 && stride == gap; }
 };
+
+// Where stamps are not a steady clock's, estimators that go along leave out a frame after so many
+// pairs, if those have frames in between. Pairs that begin at every sixth frame, say, would always
+// see the same of what repeats with every second or third one, as stamps that are rounded to 5 ms
+// do at 30 frames/s: no scatter, but an error of focal length and delay.
+constexpr int kPairsInStep = 3;
+inline bool PairsLoseTheirStep(const std::optional<StampReport>& camera_stamps) {
+  return camera_stamps && camera_stamps->kind != StampKind::kMeasured;
+}
 
 constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
 

@@ -50,6 +50,7 @@ PairGraphOptions WithNoiseOf(const Input& input, PairGraphOptions options) {
 
 // Pairs and samples in the order of real time, as CalibrateRecording feeds them.
 std::vector<WindowUpdate> RunWindow(const Input& input, const EstimationInput& data,
+                                    const std::vector<TimedPair>& pairs,
                                     SlidingWindowOptions options, const PairGraphOptions& graph) {
   std::vector<WindowUpdate> trace;
   options.graph = graph;
@@ -62,7 +63,7 @@ std::vector<WindowUpdate> RunWindow(const Input& input, const EstimationInput& d
     }
     return true;
   };
-  for (const TimedPair& pair : SideBySide(data.pairs)) {
+  for (const TimedPair& pair : pairs) {
     if (!feed_until(pair.time_b_s + input.start.delay_s)) return {};
     const auto stamp = [&](int frame) {
       return input.recording.frames[static_cast<size_t>(frame)].stamp_ns;
@@ -149,9 +150,10 @@ std::vector<EstimatorRun> RunEstimators(const std::vector<std::string>& names, c
     if (window) return;
     window.emplace();
     const PairSelection selection = SelectPairs(input.recording, kGapLimitsOnline);
-    const EstimationInput pairs = MakeEstimationInput(input.recording, selection);
+    std::vector<TimedPair> pairs = SideBySide(input.recording, selection);
+    AddMatches(input.recording, &pairs);
     const SlidingWindowOptions options = WindowOptionsFor(selection);
-    Measure([&] { window_trace = RunWindow(input, pairs, options, fit); }, &*window);
+    Measure([&] { window_trace = RunWindow(input, data, pairs, options, fit); }, &*window);
     TakeTrace(window_trace, input, &*window);
   };
   for (const std::string& name : names) {

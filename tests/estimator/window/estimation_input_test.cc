@@ -76,13 +76,26 @@ TEST(EstimationInput, OutlineKnowsTheNumbersAndMakesTheMatchesOfChosenPairs) {
   }
 }
 
-TEST(SideBySide, LeavesPairsOutThatOverlap) {
-  const Recording recording = SimulateTracks(ShortScenario(1.0))->recording;
-  const EstimationInput input = MakeEstimationInput(recording, {5, 2});
-  ASSERT_EQ(input.pairs.size(), 13u);
-  const std::vector<TimedPair> pairs = SideBySide(input.pairs);
-  ASSERT_EQ(pairs.size(), 5u);
-  for (size_t i = 0; i < pairs.size(); ++i) EXPECT_EQ(pairs[i].frame_a, 6 * static_cast<int>(i));
+// Those of errors of their own share no frame, those of a chain share their ends, and neighbours
+// are all there. Where stamps are not a clock's, the others lose their step, so as to meet every
+// phase of what repeats.
+TEST(SideBySide, PairsDoNotOverlapAndLoseTheirStep) {
+  Recording recording = SimulateTracks(ShortScenario(1.0))->recording;
+  ASSERT_EQ(recording.frames.size(), 31u);
+  const auto begins = [&](const PairSelection& selection) {
+    std::vector<int> frames;
+    for (const TimedPair& pair : SideBySide(recording, selection)) {
+      EXPECT_EQ(pair.frame_b, pair.frame_a + selection.gap);
+      frames.push_back(pair.frame_a);
+    }
+    return frames;
+  };
+  EXPECT_THAT(begins({5, 2}), testing::ElementsAre(0, 6, 12, 18, 24));
+  EXPECT_THAT(begins({3, 3}), testing::ElementsAre(0, 3, 6, 9, 12, 15, 18, 21, 24, 27));
+  recording.camera_stamps.emplace().kind = StampKind::kArrival;
+  EXPECT_THAT(begins({5, 2}), testing::ElementsAre(0, 6, 12, 19, 25));
+  EXPECT_THAT(begins({3, 3}), testing::ElementsAre(0, 3, 6, 10, 13, 16, 20, 23, 26));
+  EXPECT_EQ(begins({1, 1}).size(), 30u);
 }
 
 }  // namespace
