@@ -110,11 +110,13 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
                1e3 * c.readout_s, 1e3 * interval));
   }
   // Beyond what a noisy gyro turns.
-  if (report->unseen && std::pow(report->unseen->rms_px, 2) - std::pow(report->unseen->gyro_px, 2) >
-                            std::pow(1.3 * report->quality.rms_px, 2)) {
+  if (report->unseen &&
+      std::pow(report->unseen->usual_rms_px, 2) - std::pow(report->unseen->gyro_px, 2) >
+          std::pow(1.3 * report->quality.usual_rms_px, 2)) {
     report->doubts.push_back(
-        Format("frames that the fit has not seen fit worse: %.3f px against %.3f px",
-               report->unseen->rms_px, report->quality.rms_px));
+        Format("frames that the fit has not seen fit worse: %.3f px against %.3f px, without the "
+               "worst tenth of each",
+               report->unseen->usual_rms_px, report->quality.usual_rms_px));
   }
   if (report->online) {
     StateVector gap = Difference(*report->online, c).cwiseAbs();

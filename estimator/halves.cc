@@ -76,6 +76,7 @@ Halves FitHalves(const EstimationInput& input, const std::vector<TimedPair>& pai
                                  std::max(1, unseen.matches + other->matches));
     };
     together(&UnseenFit::rms_px);
+    together(&UnseenFit::usual_rms_px);
     together(&UnseenFit::gyro_px);
     unseen.matches += other->matches;
     unseen.pairs += other->pairs;

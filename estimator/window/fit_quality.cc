@@ -1,6 +1,7 @@
 #include "estimator/window/fit_quality.h"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -14,16 +15,37 @@
 namespace camgyro {
 
 void FitSum::Add(const std::vector<double>& residuals, double factor) {
+  OfPair& pair = pairs_.emplace_back();
   for (size_t i = 0; i < residuals.size(); i += static_cast<size_t>(per_match_)) {
     const double length = Eigen::Map<const Eigen::VectorXd>(&residuals[i], per_match_).norm();
     const double bounded = Robustify(length, options_.robust_threshold).value;
-    sum_sq_ += factor * factor * bounded * bounded;
+    pair.sum_sq += factor * factor * bounded * bounded;
     inliers_ += length <= options_.inlier_sigmas() ? 1 : 0;
-    ++matches_;
+    ++pair.matches;
   }
+  matches_ += pair.matches;
 }
 
-double FitSum::rms() const { return std::sqrt(sum_sq_ / std::max(1, per_match_ * matches_)); }
+double FitSum::RmsOf(const std::vector<OfPair>& pairs) const {
+  OfPair all;
+  for (const OfPair& pair : pairs) {
+    all.sum_sq += pair.sum_sq;
+    all.matches += pair.matches;
+  }
+  return std::sqrt(all.sum_sq / std::max(1, per_match_ * all.matches));
+}
+
+double FitSum::rms() const { return RmsOf(pairs_); }
+
+double FitSum::usual_rms() const {
+  constexpr double kWorst = 0.1;
+  std::vector<OfPair> usual = pairs_;
+  std::sort(usual.begin(), usual.end(), [](const OfPair& a, const OfPair& b) {
+    return a.sum_sq * b.matches < b.sum_sq * a.matches;
+  });
+  usual.resize(usual.size() - static_cast<size_t>(kWorst * static_cast<double>(usual.size())));
+  return RmsOf(usual);
+}
 
 UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                          const Calibration& calibration, double noise_px,
@@ -54,6 +76,7 @@ UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPa
   }
   fit.matches = sum.matches();
   fit.rms_px = noise_px * sum.rms();
+  fit.usual_rms_px = noise_px * sum.usual_rms();
   return fit;
 }
 

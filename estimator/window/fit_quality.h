@@ -18,7 +18,8 @@ struct FitQuality {
   double noise_px = 0.0;      // robust standard deviation per axis (attitudes: rad)
   // How that scatters from pair to pair: rms of the logarithms of the pairs' factors.
   double noise_scatter = 0.0;
-  double rms_px = 0.0;  // of residuals, each bounded by the loss
+  double rms_px = 0.0;        // of residuals, each bounded by the loss
+  double usual_rms_px = 0.0;  // FitSum::usual_rms
 };
 
 // How well matches fit, pair by pair.
@@ -32,12 +33,21 @@ class FitSum {
   int matches() const { return matches_; }
   // Per residual, in sigmas of a pair whose factor is 1.
   double rms() const;
+  // The same without the tenth of the pairs that fits worst: a frame whose points are all wrong, or
+  // that is late, says nothing of the model.
+  double usual_rms() const;
   double inlier_ratio() const { return static_cast<double>(inliers_) / std::max(1, matches_); }
 
  private:
   const PairGraphOptions& options_;
   const int per_match_;
-  double sum_sq_ = 0.0;
+  struct OfPair {
+    double sum_sq = 0.0;
+    int matches = 0;
+  };
+  double RmsOf(const std::vector<OfPair>& pairs) const;
+
+  std::vector<OfPair> pairs_;
   int inliers_ = 0, matches_ = 0;
 };
 
@@ -47,7 +57,7 @@ class FitSum {
 struct UnseenFit {
   int pairs = 0;
   int matches = 0;
-  double rms_px = 0.0;  // bounded by the loss, as FitQuality::rms_px
+  double rms_px = 0.0, usual_rms_px = 0.0;  // as those of FitQuality
   // What the gyro's noise may turn such pairs by (rms): it is in rms_px for the most part, and a
   // fit has it in its rates.
   double gyro_px = 0.0;

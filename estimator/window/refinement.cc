@@ -346,6 +346,7 @@ class Refinement {
     q.noise_scatter = std::sqrt(scatter_sq / static_cast<double>(noise_now_.factors.size()));
     q.matches = sum.matches();
     q.rms_px = noise_now_.scale * sum.rms();
+    q.usual_rms_px = noise_now_.scale * sum.usual_rms();
     q.inlier_ratio = sum.inlier_ratio();
     result_.converged =
         (moved.cwiseAbs().array() < options_.settled_round * result_.calibration.sigma().array())

@@ -48,8 +48,8 @@ TEST(Doubts, UnseenFramesThatFitWorseBeyondTheGyrosNoise) {
     CalibrationReport report;
     report.converged = true;
     report.calibration = s.truth;
-    report.quality.rms_px = 0.5;
-    report.unseen = UnseenFit{100, 5000, unseen_px, gyro_px};
+    report.quality.usual_rms_px = 0.5;
+    report.unseen = UnseenFit{100, 5000, 5.0, unseen_px, gyro_px};
     AddDoubts(s.recording, &report);
     return report.doubts;
   };

@@ -27,6 +27,18 @@ TEST(FitSum, BoundsWhatIsWrong) {
   EXPECT_DOUBLE_EQ(noisy.rms(), 2.0 * with_wrong);
 }
 
+TEST(FitSum, UsuallyHasNoPairThatFitsNothing) {
+  const PairGraphOptions options;
+  FitSum sum(options, /*per_match=*/1);
+  for (int pair = 0; pair < 10; ++pair) sum.Add({0.1, -0.1, 0.1}, 1.0);
+  const double usual = sum.rms();
+  EXPECT_DOUBLE_EQ(sum.usual_rms(), usual);
+  sum.Add({0.1, 50.0}, 100.0);
+  EXPECT_GT(sum.rms(), 100.0 * usual);
+  EXPECT_DOUBLE_EQ(sum.usual_rms(), usual);
+  EXPECT_EQ(sum.matches(), 32);
+}
+
 TEST(EvaluateUnseen, IsTheNoiseAtTheTruthAndMoreElsewhere) {
   const Simulated s = SimulateTracks(ShortScenario(4.0)).value();
   const EstimationInput input = MakeEstimationInput(s.recording);
