@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "frontend/gyro_spikes.h"
 #include "frontend/readers/formats.h"
 #include "frontend/readers/text.h"
 #include "frontend/stamp_clock.h"
@@ -38,6 +39,7 @@ Result<Recording> ReadRecording(const std::string& path, const ReadOptions& opti
   Result<Recording> recording = ReadAsRecorded(path);
   if (!recording) return recording;
   RepairStamps(options.stamps, &*recording);
+  MendSpikes(&*recording);
   // Of an hour, these have grown to 10 MB more than they hold.
   recording->gyro.shrink_to_fit();
   recording->accel.shrink_to_fit();
