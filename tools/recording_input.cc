@@ -68,7 +68,12 @@ Status CheckStrict(const Recording& recording) {
 }
 
 std::string DescribeRecording(const Recording& recording) {
-  const double frame_s = MedianInterval(recording.frames), gyro_s = MedianInterval(recording.gyro);
+  // Of stamps that are rounded, the median interval is another: 35 ms of 33.3 in steps of 5.
+  const auto interval_s = [](const std::optional<StampReport>& stamps, double median_s) {
+    return stamps && stamps->kind == StampKind::kArrival ? stamps->period_s : median_s;
+  };
+  const double frame_s = interval_s(recording.camera_stamps, MedianInterval(recording.frames));
+  const double gyro_s = interval_s(recording.gyro_stamps, MedianInterval(recording.gyro));
   const double span_s =
       SecondsSince(recording.frames.front().stamp_ns, recording.frames.back().stamp_ns);
   std::string size;
