@@ -12,6 +12,7 @@
 #include "estimator/calibrate.h"
 #include "estimator/start/focal_scan.h"
 #include "estimator/window/estimation_input.h"
+#include "frontend/lens_from_matches.h"
 #include "frontend/stamp_clock.h"
 #include "frontend/track_cleaner.h"
 #include "pipeline/run.h"
@@ -150,6 +151,7 @@ Status OnlineCalibration::TryStart() {
   StampReport& stamps = *recording.camera_stamps;
   stamps.repaired = repair_stamps_ && stamps.kind == StampKind::kArrival;
   progress_.frame_stamps = stamps;
+  recording.camera.division_lambda = StrongLensFromMatches(recording);
   StartOptions options;
   options.search_s = kSearchS;
   const CameraRotationsAt rotations_at = RotationsFrom(recording, kMaxScanPairs);

@@ -116,6 +116,13 @@ struct CameraGuess {
     distortion_model = model;
     distortion.assign(k.data(), k.data() + 4);
   }
+  // Of a strong lens that nothing declares, as its matches show it (DivisionLens, about the centre
+  // below; frontend/lens_from_matches.h); 0: none, or nobody has looked.
+  double division_lambda = 0.0;
+  // The declared principal point, or the picture's centre [px].
+  Eigen::Vector2d Centre() const {
+    return principal_px.value_or(Eigen::Vector2d(0.5 * (width_px - 1), 0.5 * (height_px - 1)));
+  }
   std::optional<Eigen::Quaterniond> q_gyro_cam;
   std::optional<double> readout_s;
   std::optional<double> delay_s;

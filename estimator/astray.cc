@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
+#include "core/format.h"
 #include "core/parallel.h"
 #include "core/standard_distortion.h"
 #include "estimator/residual_table.h"
@@ -176,12 +178,13 @@ double UnseenRms(const CalibrationReport& fit) {
 }
 
 std::optional<CalibrationReport> FitWithWhatLeadsAstray(
-    const Recording& recording, const StartResult& start, const Calibration& from, double noise_px,
-    double over_smooth,
-    const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with,
-    const EffectEntry** added) {
+    const Recording& recording, const StartResult& start, const Calibration& from,
+    const std::optional<AstrayFit>& astray,
+    const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with) {
   constexpr size_t kTogether = 2;  // whatever the number of threads: a fixed order of trials
+  const double noise_px = astray ? astray->noise_px : std::numeric_limits<double>::infinity();
   std::optional<CalibrationReport> best;
+  const EffectEntry* added = nullptr;
   EffectSetup setup = MakeEffectSetup(recording, from);
   TellOfStabiliser(start, &setup);
   for (const EffectEntry& entry : EffectCatalogue()) {
@@ -197,12 +200,23 @@ std::optional<CalibrationReport> FitWithWhatLeadsAstray(
         if (!fit || !IsBornOut(*fit, entry.name, from.lens[kFocal], noise_px)) continue;
         if (best && !(UnseenRms(*fit) < UnseenRms(*best))) continue;
         best = *std::move(fit);
-        *added = &entry;
+        added = &entry;
       }
-      if (best && *added == &entry && best->quality.noise_px < enough_px) break;
+      if (best && added == &entry && best->quality.noise_px < enough_px) break;
     }
-    if ((best ? best->noise_over_smooth : over_smooth) <= kNoiseOfAstray) break;
+    if (!astray || (best ? best->noise_over_smooth : astray->over_smooth) <= kNoiseOfAstray) break;
   }
+  if (!best) return best;
+  const std::string without =
+      astray
+          ? Format(
+                "without it the focal length was %.0f px (%.0f at the start), and the noise "
+                "was %.2f instead of %.2f px",
+                astray->focal_px, from.lens[kFocal], astray->noise_px, best->quality.noise_px)
+          : Format("the matches alone show it (it moves corners of the picture by about %+.0f %%)",
+                   100.0 * recording.camera.division_lambda);
+  best->notes.push_back(added->name + " is fitted as well, although nobody asked for it: " +
+                        without + "; " + added->advice);
   return best;
 }
 

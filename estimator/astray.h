@@ -70,18 +70,25 @@ bool IsSeen(const EffectSet::Item& item, const Calibration& fit);
 bool IsBornOut(const CalibrationReport& fit, const std::string& effect, double begin_focal_px,
                double noise_px);
 
+// A fit without what leads it astray.
+struct AstrayFit {
+  double focal_px = 0.0;
+  double noise_px = 0.0;
+  double over_smooth = 0.0;  // NoiseOverSmooth
+};
+
 // The calibration with one of the effects that lead fits astray (EffectEntry::leads_astray) and
 // that the data bear out: of its shapes that the start does not rule out, and of several such
-// effects, with the one that fits unseen frames best; *added is that effect. from: where fits
-// begin; noise_px, over_smooth: of the fit without, the latter as NoiseOverSmooth; fit_with: a fit
-// with an effect, as --effects names it, which is called from several threads. Two shapes are tried
-// together, the usual ones first; if one of them leaves a tenth of the variance, the others are
-// not. The lens comes first, and where nothing that is smooth is left, nothing else is tried.
+// effects, with the one that fits unseen frames best; a note says so. from: where fits begin;
+// astray: the one without, absent where the matches alone tell of a strong lens
+// (CameraGuess::division_lambda), which is all that is tried then; fit_with: a fit with an effect,
+// as --effects names it, which is called from several threads. Two shapes are tried together, the
+// usual ones first; if one of them leaves a tenth of the variance, the others are not. The lens
+// comes first, and where nothing that is smooth is left, nothing else is tried.
 std::optional<CalibrationReport> FitWithWhatLeadsAstray(
-    const Recording& recording, const StartResult& start, const Calibration& from, double noise_px,
-    double over_smooth,
-    const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with,
-    const EffectEntry** added);
+    const Recording& recording, const StartResult& start, const Calibration& from,
+    const std::optional<AstrayFit>& astray,
+    const std::function<Result<CalibrationReport>(const std::string& effect)>& fit_with);
 
 // Of the frames that each half of a fit has not seen, where it was tested; else of all [px].
 double UnseenRms(const CalibrationReport& fit);

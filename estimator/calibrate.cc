@@ -36,12 +36,16 @@ class CalibrationJob {
 
   Result<CalibrationReport> Run(const CameraRotationsAt& rotations_at) {
     if (const Status found = Start(rotations_at); !found) return tl::unexpected(found.error());
+    if (recording_.camera.division_lambda != 0.0 && MayTryWhatLeadsAstray()) {
+      if (auto better = TryWhatLeadsAstray(rotations_at, {})) return *std::move(better);
+    }
     if (!attitudes_ && options_.online) {
       if (const Status done = Window(); !done) return tl::unexpected(done.error());
       // What a fit of all pairs makes of an online estimate that is astray would take minutes.
       if (online_noise_ && FocalIsAstray(estimate_)) {
-        if (auto better = TryWhatLeadsAstray(rotations_at, estimate_, *online_noise_,
-                                             OverSmooth(estimate_, *online_noise_))) {
+        if (auto better = TryWhatLeadsAstray(rotations_at,
+                                             AstrayFit{estimate_.lens[kFocal], *online_noise_,
+                                                       OverSmooth(estimate_, *online_noise_)})) {
           return *std::move(better);
         }
       }
@@ -55,8 +59,9 @@ class CalibrationJob {
       const double noise = report_.quality.noise_px;
       report_.noise_over_smooth = OverSmooth(report_.calibration, noise);
       if (FocalIsAstray(report_.calibration) || NoiseIsAstray()) {
-        if (auto better = TryWhatLeadsAstray(rotations_at, report_.calibration, noise,
-                                             report_.noise_over_smooth)) {
+        if (auto better = TryWhatLeadsAstray(
+                rotations_at,
+                AstrayFit{report_.calibration.lens[kFocal], noise, report_.noise_over_smooth})) {
           return *std::move(better);
         }
       }
@@ -186,32 +191,20 @@ class CalibrationJob {
     return NoiseOverSmooth(recording_, input_, fit, noise_px, graph_options_);
   }
 
-  // The calibration with an effect that leads fits astray and that the data bear out: of its
-  // shapes, and of several such effects, with the one that fits unseen frames best. astray: the fit
-  // without it, and its noise.
+  // FitWithWhatLeadsAstray, from the start.
   std::optional<CalibrationReport> TryWhatLeadsAstray(const CameraRotationsAt& rotations_at,
-                                                      const Calibration& astray, double noise_px,
-                                                      double over_smooth) {
-    tried_what_leads_astray_ = true;
+                                                      const std::optional<AstrayFit>& astray) {
+    tried_what_leads_astray_ = astray.has_value();
     if (!report_.residual->facts().with_effects) return std::nullopt;
-    const double begin_px = from_start_.lens[kFocal];
-    const EffectEntry* added = nullptr;
     std::optional<CalibrationReport> best = FitWithWhatLeadsAstray(
-        recording_, report_.start, from_start_, noise_px, over_smooth,
-        [&](const std::string& effect) {
+        recording_, report_.start, from_start_, astray, [&](const std::string& effect) {
           CalibrateOptions with = options_;
           with.effects += (with.effects.empty() ? "" : ",") + effect;
           with.given_start = report_.start;
           with.try_what_leads_astray = false;
           return CalibrationJob(recording_, with, nullptr).Run(rotations_at);
-        },
-        &added);
+        });
     if (!best) return best;
-    best->notes.push_back(Format(
-        "%s is fitted as well, although nobody asked for it: without it the focal length was %.0f "
-        "px (%.0f at the start), and the noise was %.2f instead of %.2f px; %s",
-        added->name.c_str(), astray.lens[kFocal], begin_px, noise_px, best->quality.noise_px,
-        added->advice.c_str()));
     clock_.Finish("other fits");
     best->times.insert(best->times.begin(),
                        {"other fits", SecondsOf(report_.times) - SecondsOf(best->times)});

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/known_camera.h"
 #include "core/parallel.h"
 #include "core/usual_focal.h"
 #include "estimator/astray.h"
@@ -29,18 +30,9 @@ std::vector<CameraRotation> NeighbourRotations(const Recording& recording) {
 Prior MakePrior(const Recording& recording, const StartResult& start) {
   const CameraGuess& guess = recording.camera;
   Prior result;
-  Calibration& prior = result.mean;
-  prior.width_px = guess.width_px;
-  prior.height_px = guess.height_px;
-  prior.distortion_model = guess.distortion_model;
-  const Eigen::Vector2d centre(0.5 * (guess.width_px - 1), 0.5 * (guess.height_px - 1));
   const bool scanned = start.focal && start.focal->determined;
   const double focal = scanned && !guess.focal_px ? start.focal->value_px : FocalToBeginWith(guess);
-  prior.lens = MakePinhole(focal, guess.principal_px.value_or(centre), guess.aspect_ratio);
-  for (size_t i = 0; i < guess.distortion.size() && i < 4; ++i) {
-    prior.lens[FirstCoefficient(guess.distortion_model) + static_cast<int>(i)] =
-        guess.distortion[i];
-  }
+  Calibration& prior = result.mean = DeclaredCamera(guess, focal);
   const double interval = std::min(1.0 / 30.0, MedianInterval(recording.frames));
   prior.readout_s = guess.readout_s.value_or(0.5 * interval);
   prior.delay_s = start.delay_middle_row_s - 0.5 * prior.readout_s;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/calibration.h"
+#include "core/known_camera.h"
 #include "core/lens.h"
 #include "core/parallel.h"
 #include "core/time.h"
@@ -25,20 +26,6 @@ constexpr double kFollowedLog = 0.15;
 constexpr size_t kSearchEvery = 5;
 
 constexpr size_t kMatchesOfScan = 60;
-
-// The recording's declared lens, with this focal length.
-Calibration DeclaredCamera(const CameraGuess& camera, double focal_px) {
-  const Eigen::Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
-  Calibration c;
-  c.width_px = camera.width_px;
-  c.height_px = camera.height_px;
-  c.distortion_model = camera.distortion_model;
-  c.lens = MakePinhole(focal_px, camera.principal_px.value_or(centre), camera.aspect_ratio);
-  for (size_t i = 0; i < std::min<size_t>(camera.distortion.size(), 4); ++i) {
-    c.lens[FirstCoefficient(camera.distortion_model) + static_cast<int>(i)] = camera.distortion[i];
-  }
-  return c;
-}
 
 // How the gyro turned from one frame to the other. Nothing where it has a hole.
 std::optional<GyroRotation> RoughRotation(const Recording& recording, const FramePair& pair,
@@ -126,11 +113,12 @@ FramePair Thinned(const FramePair& pair, size_t most) {
 std::vector<std::vector<CameraRotation>> CameraRotationsOf(
     const Recording& recording, const std::vector<FramePair>& pairs,
     const std::vector<RotationTrial>& trials) {
+  if (trials.empty()) return {};
   std::vector<Calibration> cameras;
   for (const RotationTrial& trial : trials) {
-    cameras.push_back(DeclaredCamera(recording.camera, trial.focal_px));
+    cameras.push_back(KnownCamera(recording.camera, trial.focal_px));
   }
-  const Lens& model = GetLens(recording.camera.distortion_model);
+  const Lens& model = GetLens(cameras.front().distortion_model);
   const size_t most = trials.size() > 1 ? kMatchesOfScan : std::numeric_limits<size_t>::max();
   std::optional<LensAtRest> lens_at_rest;
   if (!recording.lens_shift.empty()) lens_at_rest.emplace(recording);

@@ -31,7 +31,7 @@ std::vector<size_t> SpreadIndices(size_t count, size_t most);
 FramePair Thinned(const FramePair& pair, size_t most);
 
 // EstimateCameraRotation (two_view_rotation.h) of each pair in each trial, with the recording's
-// declared lens (the centre of the picture where it declares no principal point) and without the
+// lens, declared or found in its matches (CameraGuess::division_lambda), and without the
 // shift of the lens that was logged, for every trial those pairs whose rotation can be found.
 // Trials some per cent of the focal length apart, one after the other, share most of the work, and
 // where there are several they take at most 60 matches of each pair: they are for finding out which

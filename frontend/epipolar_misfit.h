@@ -3,6 +3,7 @@
 #define CAMGYRO_FRONTEND_EPIPOLAR_MISFIT_H_
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "core/recording.h"
@@ -15,6 +16,14 @@ namespace camgyro {
 // shutter bend is in it, and is a smooth function of the place. Empty with fewer than 20 matches,
 // or where no matrix fits. Deterministic.
 std::vector<Eigen::Vector2d> EpipolarCorrections(const std::vector<Match>& matches);
+
+// Indices of the matches within so many robust sigmas of the epipolar lines that fit most of them
+// (least median of squares). Empty as above. Deterministic.
+std::vector<size_t> EpipolarInliers(const std::vector<Match>& matches, double sigmas);
+
+// The same corrections by the matrix that the eight-point method makes of all the matches, which
+// have to be right ones. Empty with fewer than 10.
+std::vector<Eigen::Vector2d> LinearEpipolarCorrections(const std::vector<Match>& matches);
 
 }  // namespace camgyro
 

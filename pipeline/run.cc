@@ -7,6 +7,7 @@
 #include "estimator/diagnosis/model_check.h"
 #include "estimator/reference/calibrate_with_ekf.h"
 #include "frontend/camera_rotations.h"
+#include "frontend/lens_from_matches.h"
 #include "frontend/track_jumps.h"
 #include "pipeline/track_noise.h"
 
@@ -25,12 +26,12 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
     return tl::unexpected(enough.error());
   }
   DropRepeatedPictures(recording);
-  if (tracked_elsewhere) {
-    summary->outlier_ratio = RemoveTrackJumps(recording).wrong_ratio();
-    if (recording->match_noise == MatchNoise::kBothImages && TrackNoiseAddsUp(*recording)) {
-      recording->match_noise = MatchNoise::kSecondImage;
-      summary->noise_adds_up = true;
-    }
+  if (tracked_elsewhere) summary->outlier_ratio = RemoveTrackJumps(recording).wrong_ratio();
+  recording->camera.division_lambda = StrongLensFromMatches(*recording);
+  if (tracked_elsewhere && recording->match_noise == MatchNoise::kBothImages &&
+      TrackNoiseAddsUp(*recording)) {
+    recording->match_noise = MatchNoise::kSecondImage;
+    summary->noise_adds_up = true;
   }
   return summary;
 }

@@ -19,9 +19,10 @@ namespace camgyro {
 // Tracks the pictures if the recording has neither tracks nor matches; attitudes are taken where
 // there is nothing else. Frames that repeat a picture are left out, and wrong points of tracks that
 // somebody else has made (RemoveTrackJumps); where the errors of those add up (TrackNoiseAddsUp),
-// the recording's match_noise says so. `progress` gets the stage
-// "tracking"; it may be null. Errors: of the files; kCannotEstimate with too few features or no
-// motion. Where nothing had to be tracked, its time is zero.
+// the recording's match_noise says so, and a strong lens that nothing declares is put into its
+// camera (CameraGuess::division_lambda). `progress` gets the stage "tracking"; it may be null.
+// Errors: of the files; kCannotEstimate with too few features or no motion. Where nothing had to be
+// tracked, its time is zero.
 Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* recording);
 
 // Rotations between frames in some trials, from at most `max_pairs` pairs of frames. The function

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/known_camera.h"
 #include "core/parallel.h"
 #include "core/robust_statistics.h"
+#include "core/usual_focal.h"
 #include "estimator/window/pair_selection.h"
 #include "estimator/window/smooth_motion.h"
 #include "frontend/epipolar_misfit.h"
@@ -19,10 +21,11 @@ double OwnVariance(const Recording& recording, size_t gap) {
   const size_t usable = recording.tracks.size() - gap;
   const size_t step = std::max<size_t>(1, usable / kPairs);
   const Eigen::Vector2d size_px(recording.camera.width_px, recording.camera.height_px);
+  const Calibration camera = KnownCamera(recording.camera, FocalToBeginWith(recording.camera));
   std::vector<double> of_pairs((usable + step - 1) / step, -1.0);
   ParallelFor(of_pairs.size(), [&](size_t k) {
-    const std::vector<Match> matches =
-        MatchesBetween(recording.tracks[k * step], recording.tracks[k * step + gap]);
+    const std::vector<Match> matches = ThroughPinhole(
+        camera, MatchesBetween(recording.tracks[k * step], recording.tracks[k * step + gap]));
     const std::vector<Eigen::Vector2d> corrections_px = EpipolarCorrections(matches);
     if (corrections_px.empty()) return;
     std::vector<Eigen::Vector2d> places_px;

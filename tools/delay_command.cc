@@ -173,6 +173,11 @@ Status RunDelay(const std::vector<std::string>& arguments) {
                         1e3 * start.readout->sigma_s, "ms")
                     .c_str());
   }
+  if (recording->camera.division_lambda != 0.0) {
+    std::printf(
+        "           through a lens that nothing declares: it moves corners by about %+.0f %%\n",
+        100.0 * recording->camera.division_lambda);
+  }
   if (start.stabiliser) {
     const StartStabiliser& lens = *start.stabiliser;
     std::printf("lens       makes up for %.1f ± %.1f %% of fast turns: %s\n", 100.0 * lens.gain,

@@ -10,7 +10,8 @@ the scenario of all recordings, as in `camgyro simulate`. Prints a row for each 
 that were calibrated and whose focal length, readout time and delay are all determined, part of the
 determined parameters within 3 sigma_total, their rms errors in sigma_total and in sigmas of noise,
 the medians of the errors' size of f, t_r and t_d, the recordings with a doubt, and the time of a
-calibration. Below the table: errors beyond 3 sigma_total, refusals and doubts, one line each.
+calibration. Below the table: errors beyond 3 sigma_total, refusals, effects that
+the program fitted of its own accord, and doubts, one line each.
 """
 import argparse
 import os
@@ -221,6 +222,7 @@ def run(options, fault, seed):
         with open(recording + "/truth.yaml", encoding="utf-8") as file:
             truth = yaml.safe_load(file)
         truth["clock"]["delay_s"]["value"] -= late_s
+        result["fitted"] = ["%s:%s" % (e["name"], e["shape"]) for e in calibration["effects"]]
         error, noise = errors(calibration, truth)
         unknown = calibration["quality"]["unobservable"]
         used = np.array([name not in unknown for name in calibration["covariance"]["order"]])
@@ -253,6 +255,8 @@ def print_row(fault, results):
                 fault, r["name"], ", ".join("%s %.1f" % pair for pair in off)))
         if not r["used"][shown].all():
             notes.append("%s: %s not determined" % (fault, r["name"]))
+        if r["fitted"]:
+            notes.append("%s: %s fitted as well: %s" % (fault, r["name"], ", ".join(r["fitted"])))
         notes += ["%s: %s %s" % (fault, r["name"], line) for line in r["says"]]
     return notes
 

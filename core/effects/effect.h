@@ -148,6 +148,7 @@ struct EffectSetup {
   bool has_pixels = true;  // false: attitudes
   double edge_rad = 1.0;   // angle between the axis and a corner of the picture, about
   DistortionModel distortion_model = DistortionModel::kNone;  // declared
+  double division_lambda = 0.0;  // of a lens that nothing declares (CameraGuess::division_lambda)
 
   // The frames' span on the gyro clock [s].
   double from_s() const { return frames.front().stamp_s + delay_s; }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/division_lens.h"
 #include "core/effects/entries.h"
 #include "core/effects/shapes.h"
 
@@ -10,12 +11,17 @@ namespace {
 
 class RadTan final : public Effect {
  public:
-  RadTan() : Effect({{"k1", "", 0.3, -0.6, 0.4}, {"k2", "", 0.3, -1.0, 1.0}}) {}
+  explicit RadTan(const Eigen::Vector2d& start)
+      : Effect({{"k1", "", 0.3, -0.6, 0.4}, {"k2", "", 0.3, -1.0, 1.0}}), start_(start) {}
   void ChangeLens(const Observation&, LensColumns columns) const override {
     columns(kK1, 0) = 1.0;
     columns(kK2, 1) = 1.0;
   }
   bool is_constant_lens() const override { return true; }
+  void SetStart(double* values) const override { std::copy_n(start_.data(), 2, values); }
+
+ private:
+  const Eigen::Vector2d start_;
 };
 
 // Of Kannala & Brandt's series: the difference from the declared lens, so for a pinhole that from
@@ -24,13 +30,15 @@ class RadTan final : public Effect {
 // 40 degrees that a phone sees, theta^7 is small: a kb3 of -3 does there what a kb1 of -0.7 does.
 class KannalaBrandt final : public Effect {
  public:
-  explicit KannalaBrandt(double edge_rad)
+  KannalaBrandt(double edge_rad, const Eigen::Vector4d& start)
       : Effect({Term("kb1", 2, edge_rad, -0.8, 0.5), Term("kb2", 4, edge_rad, -1.5, 1.5),
-                Term("kb3", 6, edge_rad, -2.0, 2.0), Term("kb4", 8, edge_rad, -2.0, 2.0)}) {}
+                Term("kb3", 6, edge_rad, -2.0, 2.0), Term("kb4", 8, edge_rad, -2.0, 2.0)}),
+        start_(start) {}
   void ChangeLens(const Observation&, LensColumns columns) const override {
     for (int k = 0; k < 4; ++k) columns(kKb1 + k, k) = 1.0;
   }
   bool is_constant_lens() const override { return true; }
+  void SetStart(double* values) const override { std::copy_n(start_.data(), 4, values); }
 
  private:
   // min, max: of a picture that sees 1 rad off the axis, or more.
@@ -39,6 +47,8 @@ class KannalaBrandt final : public Effect {
     const double scale = std::pow(std::min(edge_rad, 1.0), -power);
     return {name, "", 0.3, scale * min, scale * max};
   }
+
+  const Eigen::Vector4d start_;
 };
 
 constexpr char kRadTanShape[] = "radtan", kKannalaBrandtShape[] = "kannala_brandt";
@@ -52,8 +62,10 @@ std::vector<std::string> Shapes(const EffectSetup& setup) {
 std::shared_ptr<const Effect> Make(const EffectSetup& setup, const std::string& shape) {
   const std::vector<std::string> shapes = Shapes(setup);
   if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) return nullptr;
-  if (shape == kRadTanShape) return std::make_shared<RadTan>();
-  return std::make_shared<KannalaBrandt>(setup.edge_rad);
+  // Where a fit begins: at what the matches show, or at the declared lens.
+  const double lambda = setup.division_lambda, edge_tan = std::tan(setup.edge_rad);
+  if (shape == kRadTanShape) return std::make_shared<RadTan>(RadTanLike(lambda, edge_tan));
+  return std::make_shared<KannalaBrandt>(setup.edge_rad, KannalaBrandtLike(lambda, edge_tan));
 }
 
 }  // namespace

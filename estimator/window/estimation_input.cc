@@ -115,6 +115,7 @@ EffectSetup MakeEffectSetup(const Recording& recording, const Calibration& calib
   EffectSetup setup;
   setup.size_px << recording.camera.width_px, recording.camera.height_px;
   setup.distortion_model = calibration.distortion_model;
+  setup.division_lambda = recording.camera.division_lambda;
   setup.delay_s = calibration.delay_s;
   setup.readout_s = calibration.readout_s;
   setup.R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();

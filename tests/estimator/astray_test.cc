@@ -247,6 +247,22 @@ TEST(CalibrateAstray, TakesInALensAfterTheFitOfAllPairs) {
   EXPECT_GT(report->times.front().seconds, 0.0);
 }
 
+// From a wrong focal length, and without what the matches show of the lens (pipeline/run.h), the
+// online window runs away to a lens without rays for some pixels.
+TEST(CalibrateAstray, BeginsAgainWhereTheOnlineEstimateLeadsNowhere) {
+  simulation::Scenario scenario = RoomThroughALens();
+  scenario.seed = 3;
+  simulation::Simulated s = simulation::SimulateTracks(scenario).value();
+  s.recording.camera.focal_px = 290.0;
+  CalibrateOptions options;
+  options.effects = "radial_distortion:radtan";
+  const auto report = Calibrate(s.recording, options);
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_THAT(report->notes, Contains(HasSubstr("the online estimate leads nowhere")));
+  EXPECT_FALSE(report->online);
+  EXPECT_LT(ErrorInSigmas(report->calibration, s.truth).cwiseAbs().maxCoeff(), 4.5);
+}
+
 // Where the lens bends nothing, no start makes it bend: one that is wrong by a factor of 3 sends
 // the online estimate as far from it.
 TEST(CalibrateAstray, TakesInNothingThatTheDataDoNotBearOut) {

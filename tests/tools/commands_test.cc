@@ -382,17 +382,18 @@ TEST_F(CommandsTest, CalibrateMeasuredAxisDelays) {
   }
 }
 
-// Measured: the online window runs away to a lens without rays for some pixels; the fit of all
-// frames begins at the start again.
-TEST_F(CommandsTest, CalibrateMeasuredLensFromTheStart) {
+// Measured: a strong lens is seen in the matches, so that the start sees through it: a guess of the
+// focal length that is 40 % off does no harm. (It led the online window to a lens without rays.)
+TEST_F(CommandsTest, CalibrateMeasuredLensFromAWrongFocalLength) {
   const auto recording = MeasuredData("euroc-v101-flight");
   if (!recording) GTEST_SKIP() << "*** SKIPPED: no measured recording euroc-v101-flight";
   const RunResult run = Run("calibrate " + *recording +
                             " --effects=radial_distortion:radtan --focal_px=290 --out=result");
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out + run.err, HasSubstr("the online estimate leads nowhere"));
+  EXPECT_THAT(run.out, HasSubstr("explains 100 % of the gyro's motion"));
   EXPECT_THAT(run.out, testing::Not(HasSubstr("online pass and refinement differ")));
   const YAML::Node camera = YAML::LoadFile(Path("result/calibration.yaml"))["camera"];
+  EXPECT_NEAR(camera["focal_px"]["value"].as<double>(), 458.0, 8.0);
   EXPECT_NEAR(camera["distortion"]["value"][0].as<double>(), -0.28, 0.02);
 }
 
