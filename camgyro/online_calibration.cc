@@ -151,7 +151,7 @@ Status OnlineCalibration::TryStart() {
   StampReport& stamps = *recording.camera_stamps;
   stamps.repaired = repair_stamps_ && stamps.kind == StampKind::kArrival;
   progress_.frame_stamps = stamps;
-  recording.camera.division_lambda = StrongLensFromMatches(recording);
+  TakeLensFromMatches(&recording);
   StartOptions options;
   options.search_s = kSearchS;
   const CameraRotationsAt rotations_at = RotationsFrom(recording, kMaxScanPairs);

@@ -9,9 +9,14 @@
 #include <vector>
 
 #include "core/division_lens.h"
+#include "core/format.h"
+#include "core/known_camera.h"
+#include "core/lens.h"
 #include "core/parallel.h"
+#include "core/usual_focal.h"
 #include "frontend/camera_rotations.h"
 #include "frontend/epipolar_misfit.h"
+#include "frontend/readers/recording_checks.h"
 
 namespace camgyro {
 namespace {
@@ -42,20 +47,43 @@ std::vector<FramePair> LongPairs(const Recording& recording) {
   return pairs;
 }
 
+// A match as a pinhole shows it, or as nearly one as is declared.
+struct SeenMatch {
+  Match match;
+  double stretch = 1.0;  // how much longer a short line at px_b is there than in the picture
+};
+
+std::vector<SeenMatch> ThroughDeclaredLens(const Calibration& camera,
+                                           const std::vector<Match>& matches) {
+  const Lens& lens = GetLens(camera.distortion_model);
+  std::vector<SeenMatch> seen;
+  for (const Match& match : matches) {
+    RayJet ray;
+    const std::vector<Match> there = ThroughPinhole(camera, {match});
+    if (there.empty() || !lens.Unproject(match.px_b, camera.lens, &ray, LensDerivatives::kNone)) {
+      continue;
+    }
+    const double area = ray.J_ray_px.topRows<2>().determinant();
+    seen.push_back(
+        {there.front(), std::sqrt(std::abs(area * camera.lens[kAspect])) * camera.lens[kFocal]});
+  }
+  return seen;
+}
+
 // What the right matches of pairs are off their epipolar lines through lenses. Which ones are right
 // is told through one of them, so that they are the same for all.
 class MisfitOfPairs {
  public:
-  MisfitOfPairs(const CameraGuess& camera, std::vector<FramePair> pairs, int right_at_steps)
+  MisfitOfPairs(const CameraGuess& camera, const std::vector<FramePair>& pairs, int right_at_steps)
       : size_px_(camera.width_px, camera.height_px),
         centre_px_(camera.Centre()),
-        pairs_(std::move(pairs)) {
+        pairs_(pairs.size()) {
+    const Calibration declared = DeclaredCamera(camera, FocalToBeginWith(camera));
     const DivisionLens lens(kStep * right_at_steps, centre_px_, size_px_);
-    ParallelFor(pairs_.size(), [&](size_t k) {
-      const std::vector<Match> seen = pairs_[k].matches;
-      pairs_[k].matches.clear();
+    ParallelFor(pairs.size(), [&](size_t k) {
+      const std::vector<SeenMatch> seen = ThroughDeclaredLens(declared, pairs[k].matches);
       for (const size_t i : EpipolarInliers(Undistorted(lens, seen), kRightSigmas)) {
-        pairs_[k].matches.push_back(seen[i]);
+        pairs_[k].push_back(seen[i]);
       }
     });
   }
@@ -102,10 +130,14 @@ class MisfitOfPairs {
 
  private:
   // Where a pinhole would show them; those without a ray go far away, each elsewhere.
-  static std::vector<Match> Undistorted(const DivisionLens& lens, std::vector<Match> matches) {
-    for (Match& match : matches) {
+  static std::vector<Match> Undistorted(const DivisionLens& lens,
+                                        const std::vector<SeenMatch>& seen) {
+    std::vector<Match> matches;
+    for (const SeenMatch& one : seen) {
+      Match match = one.match;
       match.px_a = lens.HasRay(match.px_a) ? lens.Undistorted(match.px_a) : 1e6 * match.px_b;
       match.px_b = lens.HasRay(match.px_b) ? lens.Undistorted(match.px_b) : -1e6 * match.px_a;
+      matches.push_back(match);
     }
     return matches;
   }
@@ -118,10 +150,11 @@ class MisfitOfPairs {
     const DivisionLens lens(kStep * steps, centre_px_, size_px_);
     ParallelFor(pairs_.size(), [&](size_t k) {
       const std::vector<Eigen::Vector2d> corrections_px =
-          LinearEpipolarCorrections(Undistorted(lens, pairs_[k].matches));
+          LinearEpipolarCorrections(Undistorted(lens, pairs_[k]));
       double sum = 0.0;
       for (size_t i = 0; i < corrections_px.size(); ++i) {
-        sum += (corrections_px[i] / lens.Stretch(pairs_[k].matches[i].px_b)).squaredNorm();
+        const SeenMatch& seen = pairs_[k][i];
+        sum += (corrections_px[i] / (lens.Stretch(seen.match.px_b) * seen.stretch)).squaredNorm();
       }
       logs[k] = std::log(sum / static_cast<double>(corrections_px.size()));
     });
@@ -129,7 +162,7 @@ class MisfitOfPairs {
   }
 
   const Eigen::Vector2d size_px_, centre_px_;
-  std::vector<FramePair> pairs_;
+  std::vector<std::vector<SeenMatch>> pairs_;
   std::map<int, std::vector<double>> logs_;
 };
 
@@ -157,12 +190,27 @@ std::optional<LensFromMatches> FindLensFromMatches(const Recording& recording) {
   return LensFromMatches{lambda, std::sqrt(std::max(0.0, variance))};
 }
 
-double StrongLensFromMatches(const Recording& recording) {
-  if (recording.camera.distortion_model != DistortionModel::kNone) return 0.0;
-  const std::optional<LensFromMatches> lens = FindLensFromMatches(recording);
-  const bool strong =
-      lens && std::abs(lens->lambda) > std::max(kStrong, kStrongSigmas * lens->sigma);
-  return strong ? lens->lambda : 0.0;
+void TakeLensFromMatches(Recording* recording) {
+  CameraGuess& camera = recording->camera;
+  camera.division_lambda = 0.0;
+  const bool is_declared = camera.distortion_model != DistortionModel::kNone;
+  if (is_declared && !camera.focal_px) return;  // its coefficients mean nothing in pixels
+  const std::optional<LensFromMatches> lens = FindLensFromMatches(*recording);
+  if (!lens || std::abs(lens->lambda) < std::max(kStrong, kStrongSigmas * lens->sigma)) return;
+  if (!is_declared) {
+    camera.division_lambda = lens->lambda;
+    return;
+  }
+  AddFault(
+      "declared_distortion", 1,
+      Format("the declared distortion is not that of this camera: through it, the matches show "
+             "a lens that moves corners of the picture by about %+.0f ± %.1f %%; it is left "
+             "out",
+             100.0 * lens->lambda, 100.0 * lens->sigma),
+      recording);
+  camera.distortion_model = DistortionModel::kNone;
+  camera.distortion.clear();
+  TakeLensFromMatches(recording);
 }
 
 }  // namespace camgyro

@@ -27,7 +27,7 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
   }
   DropRepeatedPictures(recording);
   if (tracked_elsewhere) summary->outlier_ratio = RemoveTrackJumps(recording).wrong_ratio();
-  recording->camera.division_lambda = StrongLensFromMatches(*recording);
+  TakeLensFromMatches(recording);
   if (tracked_elsewhere && recording->match_noise == MatchNoise::kBothImages &&
       TrackNoiseAddsUp(*recording)) {
     recording->match_noise = MatchNoise::kSecondImage;

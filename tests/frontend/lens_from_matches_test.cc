@@ -33,6 +33,11 @@ Recording TracksOf(const simulation::Scenario& scenario) {
   return simulation::SimulateTracks(scenario)->recording;
 }
 
+double TakenFrom(Recording recording) {
+  TakeLensFromMatches(&recording);
+  return recording.camera.division_lambda;
+}
+
 // A rolling shutter, steps and runs, and no steps at all: none looks like a lens.
 TEST(FindLensFromMatches, SeesNoneWhereThereIsNone) {
   for (const MotionKind motion : {MotionKind::kWalking, MotionKind::kRunning, MotionKind::kSlow,
@@ -42,7 +47,7 @@ TEST(FindLensFromMatches, SeesNoneWhereThereIsNone) {
     ASSERT_TRUE(lens);
     EXPECT_LT(std::abs(lens->lambda), 4.0 * lens->sigma);
     EXPECT_LT(std::abs(lens->lambda), 0.03);
-    EXPECT_EQ(StrongLensFromMatches(recording), 0.0);
+    EXPECT_EQ(TakenFrom(recording), 0.0);
   }
 }
 
@@ -57,7 +62,7 @@ TEST(FindLensFromMatches, SeesHowFarTheCornersAreMoved) {
       ASSERT_TRUE(lens);
       EXPECT_NEAR(lens->lambda, lambda, 0.25 * std::abs(lambda) + 0.02) << k1;
       EXPECT_LT(lens->sigma, 0.02) << k1;
-      EXPECT_EQ(StrongLensFromMatches(recording), lens->lambda);
+      EXPECT_EQ(TakenFrom(recording), lens->lambda);
     }
   }
 }
@@ -74,7 +79,7 @@ TEST(FindLensFromMatches, SeesItInARoom) {
     scenario.motion.heading_deg = 60.0;
     scenario.tracks.count = 50;
     scenario.tracks.noise_px = 0.7;
-    EXPECT_NEAR(StrongLensFromMatches(TracksOf(scenario)), -0.21, 0.07) << seed;
+    EXPECT_NEAR(TakenFrom(TracksOf(scenario)), -0.21, 0.07) << seed;
   }
 }
 
@@ -82,14 +87,43 @@ TEST(FindLensFromMatches, SaysNothingOfAFewTracks) {
   simulation::Scenario scenario = Through(-0.28, 0.07, MotionKind::kWalking);
   scenario.tracks.count = 15;
   EXPECT_FALSE(FindLensFromMatches(TracksOf(scenario)));
-  EXPECT_EQ(StrongLensFromMatches(TracksOf(scenario)), 0.0);
+  EXPECT_EQ(TakenFrom(TracksOf(scenario)), 0.0);
   EXPECT_FALSE(FindLensFromMatches(Recording{}));
 }
 
-TEST(FindLensFromMatches, LeavesADeclaredLensAlone) {
+// What is declared is believed, where it is that of the camera.
+TEST(FindLensFromMatches, SeesThroughADeclaredLens) {
   Recording recording = TracksOf(Through(-0.28, 0.07, MotionKind::kWalking));
+  recording.camera.focal_px = 500.0;
   recording.camera.distortion_model = DistortionModel::kRadTan;
-  EXPECT_EQ(StrongLensFromMatches(recording), 0.0);
+  recording.camera.distortion = {-0.28, 0.07, 0.0, 0.0};
+  const auto lens = FindLensFromMatches(recording);
+  ASSERT_TRUE(lens);
+  EXPECT_LT(std::abs(lens->lambda), 0.02);
+  TakeLensFromMatches(&recording);
+  EXPECT_TRUE(recording.faults.empty());
+  EXPECT_EQ(recording.camera.distortion.size(), 4U);
+  EXPECT_EQ(recording.camera.division_lambda, 0.0);
+}
+
+TEST(FindLensFromMatches, LeavesOutTheLensOfAnotherCamera) {
+  for (const double k1 : {0.0, -0.28}) {
+    Recording recording = TracksOf(Through(k1, 0.0, MotionKind::kWalking));
+    recording.camera.focal_px = 500.0;
+    recording.camera.distortion_model = DistortionModel::kRadTan;
+    recording.camera.distortion = {-0.14, 0.0, 0.0, 0.0};
+    Recording without_focal = recording;
+    TakeLensFromMatches(&recording);
+    ASSERT_EQ(recording.faults.size(), 1U) << k1;
+    EXPECT_EQ(recording.faults.front().name, "declared_distortion");
+    EXPECT_EQ(recording.camera.distortion_model, DistortionModel::kNone);
+    EXPECT_TRUE(recording.camera.distortion.empty());
+    EXPECT_EQ(recording.camera.division_lambda < -0.1, k1 < 0.0);
+    // Nobody knows what coefficients mean whose focal length is not declared.
+    without_focal.camera.focal_px.reset();
+    TakeLensFromMatches(&without_focal);
+    EXPECT_TRUE(without_focal.faults.empty());
+  }
 }
 
 // EuRoC's lens, k1 -0.283 and k2 0.074 at f 458, moves a corner by 27 %.
@@ -99,7 +133,7 @@ TEST(FindLensFromMatches, Measured) {
     if (!folder) GTEST_SKIP() << name << " is not there (CAMGYRO_DATA)";
     const Result<Recording> recording = ReadRecording(*folder);
     ASSERT_TRUE(recording) << recording.error().message;
-    EXPECT_NEAR(StrongLensFromMatches(*recording), -0.32, 0.03) << name;
+    EXPECT_NEAR(TakenFrom(*recording), -0.32, 0.03) << name;
   }
 }
 
