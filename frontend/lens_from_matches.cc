@@ -31,7 +31,7 @@ constexpr size_t kBlocks = 10;
 // Matches that are farther off their lines are wrong, and not only seen through another lens: with
 // 4, those near the lines of a wrong lens are chosen, and it stays (of 8 rooms in 4).
 constexpr double kRightSigmas = 8.0;
-constexpr double kStrong = 0.05, kStrongSigmas = 5.0;
+constexpr double kStrong = 0.03, kStrongSigmas = 5.0;
 
 std::vector<FramePair> LongPairs(const Recording& recording) {
   std::vector<FramePair> pairs;

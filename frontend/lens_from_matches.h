@@ -21,8 +21,8 @@ struct LensFromMatches {
 // the pairs have enough matches, or where no lens in this range is better than its neighbours.
 std::optional<LensFromMatches> FindLensFromMatches(const Recording& recording);
 
-// Puts its lambda into the camera (CameraGuess::division_lambda), where it is more than 0.05 and 5
-// sigmas, else 0. What makers leave of a lens that they correct is a fifth of that
+// Puts its lambda into the camera (CameraGuess::division_lambda), where it is more than 0.03 and 5
+// sigmas, else 0. What makers leave of a lens that they correct is a third of that
 // (core/effects/device_class.cc); rolling shutters, noise and wrong matches have made less of it in
 // all of 90 simulated recordings (docs/lab/lens_from_matches.md). A declared distortion, with a
 // declared focal length, that leaves so much is that of another camera: the fault
