@@ -19,6 +19,7 @@
 #include "frontend/readers/read_recording.h"
 #include "pipeline/read_calibration.h"
 #include "simulation/simulate.h"
+#include "tests/estimator/simulated_input.h"
 #include "tests/paths.h"
 
 namespace camgyro {
@@ -146,20 +147,8 @@ TEST(EnsureImageMotion, FindsTracksWhoseErrorsAddUp) {
 // ± 5.5 px, at 458.
 TEST(RunCalibration, BeginsWithTheLensThatTheMatchesShow) {
   for (const uint64_t seed : {2, 4}) {
-    simulation::Scenario scenario;
+    simulation::Scenario scenario = RoomThroughALens();
     scenario.seed = seed;
-    scenario.duration_s = 10.0;
-    scenario.camera.width_px = 752;
-    scenario.camera.focal_px = 458.0;
-    scenario.scene.kind = simulation::SceneKind::kRoom;
-    scenario.motion.speed_m_s = 0.8;
-    scenario.motion.path_radius_m = 1.5;
-    scenario.motion.heading_deg = 60.0;
-    scenario.tracks.count = 50;
-    scenario.tracks.noise_px = 0.7;
-    scenario.gyro.accelerometer = false;
-    scenario.effects.radial_distortion.k1 = -0.28;
-    scenario.effects.radial_distortion.k2 = 0.07;
     auto s = simulation::SimulateTracks(scenario);
     ASSERT_TRUE(s);
     const auto run =

@@ -4,6 +4,7 @@
 
 #include "frontend/readers/read_recording.h"
 #include "simulation/simulate.h"
+#include "tests/estimator/simulated_input.h"
 #include "tests/measured_data.h"
 
 namespace camgyro {
@@ -53,17 +54,8 @@ TEST(GrowthOfTrackNoise, IsNotFooledByWrongMatches) {
 // Near and far things through a strong lens, which has to be known (pipeline/run.h): this recording
 // was told that its tracks' errors add up, and its focal length was 6 % off.
 TEST(GrowthOfTrackNoise, IsNotFooledByALens) {
-  simulation::Scenario scenario = Moving(MotionKind::kHandheld, 0.7, false);
-  scenario.duration_s = 10.0;
-  scenario.camera.width_px = 752;
-  scenario.camera.focal_px = 458.0;
-  scenario.scene.kind = simulation::SceneKind::kRoom;
-  scenario.motion.speed_m_s = 0.8;
-  scenario.motion.path_radius_m = 1.5;
-  scenario.motion.heading_deg = 60.0;
-  scenario.tracks.count = 50;
-  scenario.effects.radial_distortion.k1 = -0.28;
-  scenario.effects.radial_distortion.k2 = 0.07;
+  simulation::Scenario scenario = RoomThroughALens();
+  scenario.seed = 4;
   Recording recording = TracksOf(scenario);
   EXPECT_TRUE(TrackNoiseAddsUp(recording));
   recording.camera.division_lambda = -0.3;
