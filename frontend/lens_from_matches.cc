@@ -29,7 +29,7 @@ constexpr double kStep = 0.05;
 constexpr int kMostSteps = 15;
 constexpr size_t kBlocks = 10;
 // Matches that are farther off their lines are wrong, and not only seen through another lens: with
-// 4, those near the lines of a wrong lens are chosen, and it stays (of 8 rooms in 4).
+// 4, those near the lines of a wrong lens are chosen, and it stays (docs/lab/lens_from_matches.md).
 constexpr double kRightSigmas = 8.0;
 constexpr double kStrong = 0.03, kStrongSigmas = 5.0;
 
@@ -178,6 +178,7 @@ std::optional<LensFromMatches> FindLensFromMatches(const Recording& recording) {
     if (through->pairs_that_tell() < kLeastPairs) return std::nullopt;
     before = std::exchange(near, through->Descend(near));
   }
+  if (std::abs(near) == kMostSteps) return std::nullopt;
   MisfitOfPairs& misfit = *through;
   const double lambda = misfit.Minimum(near);
   double sum = 0.0, squares = 0.0;
@@ -187,7 +188,9 @@ std::optional<LensFromMatches> FindLensFromMatches(const Recording& recording) {
     squares += without * without;
   }
   const double n = kBlocks, variance = (squares - sum * sum / n) * (n - 1.0) / n;
-  return LensFromMatches{lambda, std::sqrt(std::max(0.0, variance))};
+  // No parabola has a minimum: nothing is known of how well it is told.
+  if (!(variance > 0.0)) return std::nullopt;
+  return LensFromMatches{lambda, std::sqrt(variance)};
 }
 
 void TakeLensFromMatches(Recording* recording) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <tuple>
 
 #include "frontend/readers/read_recording.h"
@@ -89,6 +90,19 @@ TEST(FindLensFromMatches, SaysNothingOfAFewTracks) {
   EXPECT_FALSE(FindLensFromMatches(TracksOf(scenario)));
   EXPECT_EQ(TakenFrom(TracksOf(scenario)), 0.0);
   EXPECT_FALSE(FindLensFromMatches(Recording{}));
+}
+
+// Points that are anywhere in every frame lie on no lines, through whatever lens.
+TEST(FindLensFromMatches, TakesNothingFromNonsense) {
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    Recording recording = TracksOf(Through(0.0, 0.0, MotionKind::kWalking));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(0.0, 640.0), v(0.0, 480.0);
+    for (auto& points : recording.tracks) {
+      for (TrackedPoint& point : points) point.px << u(random), v(random);
+    }
+    EXPECT_EQ(TakenFrom(recording), 0.0) << seed;
+  }
 }
 
 // What is declared is believed, where it is that of the camera.
