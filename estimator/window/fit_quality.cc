@@ -26,16 +26,17 @@ void FitSum::Add(const std::vector<double>& residuals, double factor) {
   matches_ += pair.matches;
 }
 
-double FitSum::RmsOf(const std::vector<OfPair>& pairs) const {
-  OfPair all;
+double FitSum::RmsOf(const std::vector<OfPair>& pairs, int lost_per_pair) const {
+  double sum_sq = 0.0;
+  int freedom = 0;
   for (const OfPair& pair : pairs) {
-    all.sum_sq += pair.sum_sq;
-    all.matches += pair.matches;
+    sum_sq += pair.sum_sq;
+    freedom += std::max(0, per_match_ * pair.matches - lost_per_pair);
   }
-  return std::sqrt(all.sum_sq / std::max(1, per_match_ * all.matches));
+  return std::sqrt(sum_sq / std::max(1, freedom));
 }
 
-double FitSum::rms() const { return RmsOf(pairs_); }
+double FitSum::rms() const { return RmsOf(pairs_, 0); }
 
 double FitSum::usual_rms() const {
   constexpr double kWorst = 0.1;
@@ -44,14 +45,14 @@ double FitSum::usual_rms() const {
     return a.sum_sq * b.matches < b.sum_sq * a.matches;
   });
   usual.resize(usual.size() - static_cast<size_t>(kWorst * static_cast<double>(usual.size())));
-  return RmsOf(usual);
+  return RmsOf(usual, lost_per_pair_);
 }
 
 UnseenFit EvaluateUnseen(const EstimationInput& input, const std::vector<TimedPair>& pairs,
                          const Calibration& calibration, double noise_px,
                          const PairGraphOptions& options) {
   UnseenFit fit;
-  FitSum sum(options, options.residual->facts().per_match);
+  FitSum sum(options, options.residual->facts().per_match, /*lost_per_pair=*/0);
   std::vector<std::optional<std::vector<double>>> of_pairs(pairs.size());
   ParallelFor(pairs.size(), [&](size_t i) {
     std::vector<double> residuals;

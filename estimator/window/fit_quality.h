@@ -25,27 +25,28 @@ struct FitQuality {
 // How well matches fit, pair by pair.
 class FitSum {
  public:
-  // per_match: residuals. The options must outlive it.
-  FitSum(const PairGraphOptions& options, int per_match)
-      : options_(options), per_match_(per_match) {}
+  // per_match: residuals. lost_per_pair: degrees of freedom that a fit takes of these. The options
+  // must outlive it.
+  FitSum(const PairGraphOptions& options, int per_match, int lost_per_pair)
+      : options_(options), per_match_(per_match), lost_per_pair_(lost_per_pair) {}
   // Independent residuals of a pair, in sigmas, without loss. factor: of its noise.
   void Add(const std::vector<double>& residuals, double factor);
   int matches() const { return matches_; }
   // Per residual, in sigmas of a pair whose factor is 1.
   double rms() const;
-  // The same without the tenth of the pairs that fits worst: a frame whose points are all wrong, or
-  // that is late, says nothing of the model.
+  // Per degree of freedom, and without the tenth of the pairs that fits worst: a frame whose points
+  // are all wrong, or that is late, says nothing of the model.
   double usual_rms() const;
   double inlier_ratio() const { return static_cast<double>(inliers_) / std::max(1, matches_); }
 
  private:
   const PairGraphOptions& options_;
-  const int per_match_;
+  const int per_match_, lost_per_pair_;
   struct OfPair {
     double sum_sq = 0.0;
     int matches = 0;
   };
-  double RmsOf(const std::vector<OfPair>& pairs) const;
+  double RmsOf(const std::vector<OfPair>& pairs, int lost_per_pair) const;
 
   std::vector<OfPair> pairs_;
   int inliers_ = 0, matches_ = 0;
@@ -53,7 +54,9 @@ class FitSum {
 
 // Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
 // direction of each pair (and its frames' own times, if they have any) from every other match,
-// residuals from the rest. A transfer has no direction: residuals from all matches.
+// residuals from the rest, less what the direction's own error lets expect (PredictedResiduals):
+// with few matches it is as large as the noise. A transfer has no direction: residuals from all
+// matches.
 struct UnseenFit {
   int pairs = 0;
   int matches = 0;

@@ -175,6 +175,18 @@ double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t fir
   return equations.WithPrior().ldlt().solve(equations.data).trace();
 }
 
+std::vector<double> PredictedResiduals(const PairView& view, const PairPlane& of_even) {
+  const PlaneEquations equations(view, of_even, 0, 2);
+  const Eigen::LDLT<PlaneEquations::Matrix8d> information(equations.WithPrior());
+  std::vector<double> residuals;
+  for (size_t i = 1; i < view.bearings.a.size(); i += 2) {
+    const PlaneResidual r = ResidualOf(view, of_even, i);
+    const PlaneEquations::Vector8d J = equations.RowOf(view, r, RobustResidual{r.value, 1.0}, i);
+    residuals.push_back(r.value / std::sqrt(1.0 + J.dot(information.solve(J))));
+  }
+  return residuals;
+}
+
 bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
               double noise, const PairGraphOptions& options, PairView* view,
               const Eigen::Vector2d& offsets_s) {

@@ -55,6 +55,9 @@ PairPlane FitPlane(const PairView& view, size_t first = 0, size_t step = 1);
 // most 6, since what of the bend lies along the direction changes nothing.
 double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t first = 0,
                         size_t step = 1);
+// Residuals of the matches 1, 3, 5, ... under a plane that FitPlane found of the matches 0, 2, 4,
+// ..., without loss, in sigmas of what noise lets expect, of which the plane's own error is a part.
+std::vector<double> PredictedResiduals(const PairView& view, const PairPlane& of_even);
 // Of match i, in sigmas, without loss.
 PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i);
 

@@ -335,7 +335,7 @@ class Refinement {
         !known) {
       return known;
     }
-    FitSum sum(graph_options_, facts_.per_match);
+    FitSum sum(graph_options_, facts_.per_match, facts_.lost_per_pair);
     for (size_t i = 0; i < residuals.size(); ++i) sum.Add(residuals[i], noise_now_.factors[i]);
     FitQuality& q = result_.quality;
     q = FitQuality();

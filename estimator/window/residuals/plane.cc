@@ -70,10 +70,7 @@ class Plane final : public PairResidual {
     PairView view;
     PairPlane plane;
     if (!FitPair(input, pair, calibration, noise, options, &view, &plane, 0, 2)) return false;
-    residuals->clear();
-    for (size_t i = 1; i < view.bearings.a.size(); i += 2) {
-      residuals->push_back(ResidualOf(view, plane, i).value);
-    }
+    *residuals = PredictedResiduals(view, plane);
     return true;
   }
 };
