@@ -98,7 +98,7 @@ class PairGraph {
   // PairResidual::Independent of a pair at the present estimate. With `search`, its direction is
   // first searched anew, and stored if it is better. Empty if a ray is missing.
   std::vector<double> Residuals(int64_t id, bool search) {
-    return Residuals(id, search, &bearings_);
+    return Residuals(id, search, /*least_gain=*/0.0, &bearings_);
   }
   // Without a search; adds how far each match is to one side of its plane, where pairs have a
   // direction. While a pair keeps its linearisation, these are those of before: they have changed
@@ -106,8 +106,9 @@ class PairGraph {
   std::vector<double> ResidualsWithLeans(int64_t id, TrackLeans* leans);
   // Takes the matches of these tracks (ascending ids) out of the pairs, where kMinMatches are left.
   void LeaveOutTracks(const std::vector<int64_t>& track_ids);
-  // Of all pairs, in the order of pair_ids.
-  std::vector<std::vector<double>> AllResiduals(bool search);
+  // Of all pairs, in the order of pair_ids. With `search`, a direction is stored if its cost is
+  // less by more than least_gain [sigmas^2].
+  std::vector<std::vector<double>> AllResiduals(bool search, double least_gain = 0.0);
   // The same residuals under the pair's own direction, and each under the direction that fits the
   // other half of the matches: see CrossFit.
   CrossFit CrossFitOf(int64_t id) { return CrossFitOf(id, &bearings_); }
@@ -122,8 +123,9 @@ class PairGraph {
   // Whether frames have times of their own here (frame_stamp_jitter).
   bool has_frame_times() const { return frame_time_spread_s_ != nullptr; }
   // What each pair says of them at the present estimate of everything else; frames are named by
-  // FrameNumber.
-  std::vector<PairTimes> FrameTimes() const;
+  // FrameNumber. Less by the factor that widens a covariance (CrossFit::inflation): directions have
+  // taken noise for themselves there, too.
+  std::vector<PairTimes> FrameTimes(double inflation = 1.0) const;
   static int64_t FrameNumber(double stamp_s);  // [ns]
   // Searches the times of frames where they may be caught in a minimum that is not the deepest: a
   // frame that is late by so much that most of its matches look wrong pulls no solve to its time,
@@ -180,7 +182,7 @@ class PairGraph {
   // A pair with these bearings, at the present estimate; a copy.
   PairView ViewOf(const Pair& pair, const PairBearings& bearings) const;
   // Beside each other for different pairs, with bearings of their own to work in.
-  std::vector<double> Residuals(int64_t id, bool search, PairBearings* bearings);
+  std::vector<double> Residuals(int64_t id, bool search, double least_gain, PairBearings* bearings);
   CrossFit CrossFitOf(int64_t id, PairBearings* bearings);
   // body(place in the order of pair_ids, id, bearings to work in), beside each other.
   void ForAllPairs(const std::function<void(size_t, int64_t, PairBearings*)>& body);

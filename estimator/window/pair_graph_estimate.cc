@@ -15,7 +15,8 @@
 
 namespace camgyro {
 
-std::vector<double> PairGraph::Residuals(int64_t id, bool search, PairBearings* bearings) {
+std::vector<double> PairGraph::Residuals(int64_t id, bool search, double least_gain,
+                                         PairBearings* bearings) {
   const Pair& pair = pairs_.at(id);
   const PairMeasurement& m = *pair.measurement;
   std::vector<double> residuals =
@@ -30,7 +31,7 @@ std::vector<double> PairGraph::Residuals(int64_t id, bool search, PairBearings* 
       FindDirection(*bearings, m.variance_a(), m.variance_b(), m.robust_threshold);
   cost += CostOfPointsBehind(*bearings, m.variance_a(), m.variance_b(), m.robust_threshold,
                              graph_.value(DirectionBlock(id)));
-  if (!(found.cost < cost)) return residuals;
+  if (!(found.cost < cost - least_gain)) return residuals;
   graph_.value(DirectionBlock(id)) = found.tau;
   graph_.value(BendBlock(id)).setZero();
   return std::move(found.residuals);
@@ -67,7 +68,7 @@ CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
   CrossFit fit;
   if (!residual().facts().has_direction) return fit;
   const std::vector<double> own =
-      Residuals(id, /*search=*/false, bearings);  // fills the bearings, too
+      Residuals(id, /*search=*/false, 0.0, bearings);  // fills the bearings, too
   if (own.size() < 2 * kMinMatches) return fit;
   const Pair& pair = pairs_.at(id);
   const PairView view = ViewOf(pair, *bearings);
@@ -99,10 +100,10 @@ void PairGraph::ForAllPairs(const std::function<void(size_t, int64_t, PairBearin
   });
 }
 
-std::vector<std::vector<double>> PairGraph::AllResiduals(bool search) {
+std::vector<std::vector<double>> PairGraph::AllResiduals(bool search, double least_gain) {
   std::vector<std::vector<double>> residuals(pairs_.size());
   ForAllPairs([&](size_t i, int64_t id, PairBearings* bearings) {
-    residuals[i] = Residuals(id, search, bearings);
+    residuals[i] = Residuals(id, search, least_gain, bearings);
   });
   return residuals;
 }

@@ -199,7 +199,7 @@ void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair, PairBearings* bearing
   for (double width = kWidest; width >= 1.0; width *= 0.5) {
     SetSigma(id, width * sigma);
     // The direction, of these times.
-    if (width == kWidest) Residuals(id, /*search=*/true, bearings);
+    if (width == kWidest) Residuals(id, /*search=*/true, 0.0, bearings);
     const double information = std::pow(width * *frame_time_spread_s_, -2);
     for (int step = 0; step < kSteps; ++step) {
       equations.Begin();
@@ -216,7 +216,7 @@ void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair, PairBearings* bearing
 }
 
 double PairGraph::RightShare(int64_t id, PairBearings* bearings) {
-  const std::vector<double> residuals = Residuals(id, /*search=*/false, bearings);
+  const std::vector<double> residuals = Residuals(id, /*search=*/false, 0.0, bearings);
   const auto right = std::count_if(residuals.begin(), residuals.end(), [&](double r) {
     return std::abs(r) <= options_.inlier_sigmas();
   });
@@ -242,7 +242,7 @@ bool PairGraph::SearchFrameTimesOf(int64_t id, const std::vector<int64_t>& touch
   const auto cost = [&] {
     double sum = 0.0;
     for (const int64_t one : touched) {
-      const std::vector<double> now = Residuals(one, /*search=*/true, &bearings);
+      const std::vector<double> now = Residuals(one, /*search=*/true, 0.0, &bearings);
       if (now.empty()) return std::numeric_limits<double>::infinity();
       sum += CostOfTimes(one, pairs_.at(one), now);
     }
@@ -333,10 +333,14 @@ void PairGraph::SearchFrameTimes() {
   }
 }
 
-std::vector<PairTimes> PairGraph::FrameTimes() const {
+std::vector<PairTimes> PairGraph::FrameTimes(double inflation) const {
   std::vector<PairTimes> all;
   if (!has_frame_times()) return all;
-  for (const auto& entry : pairs_) all.push_back(FrameTimesOf(entry.second));
+  for (const auto& entry : pairs_) {
+    all.push_back(FrameTimesOf(entry.second));
+    all.back().score /= inflation;
+    all.back().information /= inflation;
+  }
   return all;
 }
 

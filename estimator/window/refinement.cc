@@ -57,17 +57,6 @@ bool UpdateFrameTimes(double settled, PairGraph* graph, std::vector<FrameOffset>
   return std::abs(spread.value_s - before_s) < std::max(kNothingS, settled * before_s);
 }
 
-// What pairs say of the frames' own times, less by the factor that widens the covariance: their
-// directions have taken noise for themselves there, too.
-std::vector<PairTimes> WidenedTimes(const PairGraph& graph, double inflation) {
-  std::vector<PairTimes> times = graph.FrameTimes();
-  for (PairTimes& pair : times) {
-    pair.score /= inflation;
-    pair.information /= inflation;
-  }
-  return times;
-}
-
 // How far the frames' own times wander together, for the covariance of the delay.
 FrameWander FindWander(const std::vector<PairTimes>& times, PairGraph* graph) {
   const double spread_s = graph->frame_time_spread_s();
@@ -92,6 +81,13 @@ constexpr int kLeastPairs = 10;
 // The first solve has a scale of the noise that is the misfit of the start; the second one shows
 // where a fit goes.
 constexpr int kRoundsToGetLost = 2;
+
+// Without parallax many directions fit a pair equally well; which one fits best changes with every
+// step of the state, and the state with them: it may wander for ever by half a sigma in each round
+// (Refinement.SettlesWhereDirectionsMeanNothing). After so many rounds, a direction is left only
+// for one that saves what a wrong match costs, then twice as much, and so on. Not from the first
+// round on, which makes the errors in far scenes larger (docs/lab/pairs.md#directions-that-wander).
+constexpr int kRoundsOfFreeSearch = 4;
 
 double KeptBytes(const std::vector<TimedPair>& pairs, const PairGraphOptions& options) {
   double bytes = 0.0;
@@ -133,7 +129,7 @@ class Refinement {
       if (result_.rounds == 1) {
         FindFirstScale();
       } else if (facts_.has_direction) {
-        AllResiduals(/*search=*/true);
+        graph_->AllResiduals(/*search=*/true, LeastGainOfDirection());
       }
       // A fit that has settled has done so, and it takes long.
       if (options_.latents == nullptr || options_.latents->planes.empty()) {
@@ -317,12 +313,18 @@ class Refinement {
     return graph_->AllResiduals(search);
   }
 
+  // By how much another direction has to fit a pair better [sigmas^2].
+  double LeastGainOfDirection() const {
+    const int more = result_.rounds - kRoundsOfFreeSearch;
+    return more <= 0 ? 0.0 : std::ldexp(std::pow(graph_options_.inlier_sigmas(), 2), more - 1);
+  }
+
   // Covariance, quality, and whether the last round has moved the estimate.
   Status Judge(const Calibration& before, const std::vector<std::vector<double>>& residuals) {
     const StateVector moved = Difference(result_.calibration, before);
     const CrossFit cross_fit = graph_->CrossFitOfAll();
     if (graph_->has_frame_times()) {
-      const std::vector<PairTimes> times = WidenedTimes(*graph_, cross_fit.inflation());
+      const std::vector<PairTimes> times = graph_->FrameTimes(cross_fit.inflation());
       result_.frame_wander = FindWander(times, graph_.get());
       result_.frame_times = OffsetsOf(times, result_.frame_wander);
     }
