@@ -38,7 +38,7 @@ Result<std::vector<ReportSection>> CalibrationSections(const Recording& recordin
                                                        const RunInfo& run) {
   const bool attitudes = recording.HasOnlyAttitudes();
   const Calibration& calibration = report.calibration;
-  std::vector<ReportSection> sections = {SummarySection(report, attitudes),
+  std::vector<ReportSection> sections = {SummarySection(recording, report, attitudes),
                                          MotionSection(recording, report, attitudes),
                                          ConvergenceSection(report), DelaySection(report.start)};
   // What takes long, beside each other.

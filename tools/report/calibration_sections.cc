@@ -141,7 +141,8 @@ std::string EffectsTable(const Calibration& c) {
 
 }  // namespace
 
-ReportSection SummarySection(const CalibrationReport& report, bool attitudes) {
+ReportSection SummarySection(const Recording& recording, const CalibrationReport& report,
+                             bool attitudes) {
   const Calibration& c = report.calibration;
   const Eigen::Matrix3d permutation = MountingPermutation(c);
   const std::vector<ParameterRow> rows = ParameterRows(c, permutation, attitudes);
@@ -177,6 +178,9 @@ ReportSection SummarySection(const CalibrationReport& report, bool attitudes) {
   html += EffectsTable(c);
   if (!report.doubts.empty()) html += "<h3>Doubts</h3>\n" + BulletList(report.doubts);
   if (!report.notes.empty()) html += "<h3>Notes</h3>\n" + BulletList(report.notes);
+  if (!recording.notes.empty()) {
+    html += "<h3>Found in the data</h3>\n" + BulletList(recording.notes);
+  }
   return {"summary", "Result", html};
 }
 

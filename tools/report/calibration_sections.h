@@ -12,10 +12,12 @@
 
 namespace camgyro {
 
-// Verdict in plain words, every parameter with its sigma, doubts and notes. The cells of the table
+// Verdict in plain words, every parameter with its sigma, doubts, notes, and what was found in the
+// data (Recording::notes: its faults, and how it was read). The cells of the table
 // carry the keys of calibration.yaml ("clock.delay_s.value", "gyro.bias_rad_s.sigma.2") and its
 // numbers.
-ReportSection SummarySection(const CalibrationReport& report, bool attitudes);
+ReportSection SummarySection(const Recording& recording, const CalibrationReport& report,
+                             bool attitudes);
 
 // How much the recording narrowed each parameter, how the camera turned meanwhile, and which motion
 // would determine the rest.

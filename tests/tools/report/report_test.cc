@@ -135,6 +135,19 @@ TEST_F(ReportTest, IsOneRepeatableFile) {
   EXPECT_THAT(first, HasSubstr("A sound calibration"));
 }
 
+// What was mended is said where the result is read, in `diagnose` as well, which shows the same.
+TEST_F(ReportTest, SaysWhatWasFoundInTheData) {
+  Simulate(kHandheld, "a");
+  ASSERT_EQ(Run("calibrate a --out=result --quiet").exit_code, 0);
+  EXPECT_THAT(ReadFile(Path("result/report.html")), Not(HasSubstr("Found in the data")));
+  const std::string gyro = ReadFile(Path("a/imu0/data.csv"));
+  const size_t end = gyro.rfind('\n', gyro.size() - 2);
+  std::ofstream(Path("a/imu0/data.csv")) << gyro << gyro.substr(end + 1);  // the last sample twice
+  ASSERT_EQ(Run("calibrate a --out=result --quiet").exit_code, 0);
+  EXPECT_THAT(ReadFile(Path("result/report.html")),
+              AllOf(HasSubstr("<h3>Found in the data</h3>"), HasSubstr("repeat")));
+}
+
 TEST_F(ReportTest, SaysWhichMotionToAdd) {
   Simulate(kSlow, "a");
   const RunResult run = Run("calibrate a --out=result");
