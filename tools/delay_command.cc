@@ -13,6 +13,7 @@
 #include "estimator/start/focal_scan.h"
 #include "estimator/start/slerp_delay_search.h"
 #include "frontend/camera_rotations.h"
+#include "frontend/lens_from_matches.h"
 #include "frontend/two_view_rotation.h"
 #include "pipeline/result_files.h"
 #include "pipeline/run.h"
@@ -173,10 +174,13 @@ Status RunDelay(const std::vector<std::string>& arguments) {
                         1e3 * start.readout->sigma_s, "ms")
                     .c_str());
   }
-  if (recording->camera.division_lambda != 0.0) {
-    std::printf(
-        "           through a lens that nothing declares: it moves corners by about %+.0f %%\n",
-        100.0 * recording->camera.division_lambda);
+  if (const auto lens = FindLensFromMatches(*recording)) {
+    std::printf("           by the matches, the lens moves corners by %.1f ± %.1f %%%s%s\n",
+                100.0 * lens->lambda, 100.0 * lens->sigma,
+                recording->camera.distortion_model == DistortionModel::kNone
+                    ? ""
+                    : " beside what is declared",
+                recording->camera.division_lambda != 0.0 ? ": looked through" : "");
   }
   if (start.stabiliser) {
     const StartStabiliser& lens = *start.stabiliser;

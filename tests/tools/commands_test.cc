@@ -164,6 +164,15 @@ TEST_F(CommandsTest, DelayFindsTheMiddleRowsDelay) {
   EXPECT_LT(sigma_ms, 3.0);
   EXPECT_THAT(run.out, AllOf(HasSubstr("unexplained, by delay"), HasSubstr("100 % |")));
   EXPECT_TRUE(Exists("result/delay.csv"));
+  // It has no distortion.
+  constexpr char kLens[] = "by the matches, the lens moves corners by ";
+  const size_t at = run.out.find(kLens);
+  ASSERT_NE(at, std::string::npos) << run.out;
+  double percent = 0.0, sigma = 0.0;
+  ASSERT_EQ(std::sscanf(&run.out[at + sizeof(kLens) - 1], "%lf ± %lf %%", &percent, &sigma), 2);
+  EXPECT_GT(sigma, 0.0);
+  EXPECT_LT(std::abs(percent), 4.0 * sigma);
+  EXPECT_THAT(run.out, testing::Not(HasSubstr("looked through")));
 }
 
 TEST_F(CommandsTest, TrackWritesTracksThatReplaceThePictures) {
