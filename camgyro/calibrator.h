@@ -74,6 +74,10 @@ struct Snapshot {
   std::string gyro_stamps;  // what they are, for people; empty before two seconds, or kRecorded
   // The same of the frames' stamps; empty before the first search for a start.
   std::string frame_stamps;
+  // What the matches show of the lens that was not declared, for people: that there is a strong
+  // one, which the estimate takes in, or that the declared distortion is of another camera, and is
+  // left out. Empty if there is no such thing, and before the first search for a start.
+  std::string lens;
   std::string doubt;  // for people: the pictures show an effect that the model lacks; or empty
   Calibration calibration;  // meaningful once `has_estimate`
   bool has_estimate = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "core/format.h"
@@ -38,6 +39,15 @@ constexpr char kEffects[] = "clock_skew";
 // The window would have to know the lens at every sample to come.
 tl::unexpected<Error> StabilisedLens() {
   return CannotEstimate("the lens moves as the camera turns: switch its stabilisation off");
+}
+
+// For people; empty where what was declared will do.
+std::string WhatMatchesShowOfLens(const Recording& recording) {
+  if (!recording.faults.empty()) return recording.faults.front().finding;
+  if (recording.camera.division_lambda == 0.0) return "";
+  return Format(
+      "nothing declares the lens' distortion: it moves corners of the picture by %+.0f %%",
+      100.0 * recording.camera.division_lambda);
 }
 
 // A fit of all that was collected, with the distortion of a lens that nothing declares where it
@@ -152,6 +162,7 @@ Status OnlineCalibration::TryStart() {
   stamps.repaired = repair_stamps_ && stamps.kind == StampKind::kArrival;
   progress_.frame_stamps = stamps;
   TakeLensFromMatches(&recording);
+  progress_.lens = WhatMatchesShowOfLens(recording);
   StartOptions options;
   options.search_s = kSearchS;
   const CameraRotationsAt rotations_at = RotationsFrom(recording, kMaxScanPairs);

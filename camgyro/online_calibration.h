@@ -37,6 +37,7 @@ class OnlineCalibration {
     // frame a time of its own, and these are that frame's and its spread.
     std::optional<StampReport> frame_stamps;
     double frame_offset_s = 0.0, frame_offset_sigma_s = 0.0, frame_spread_s = 0.0;
+    std::string lens;  // as in Snapshot
     // Largest change of each parameter within the last two seconds of the camera; infinite before.
     StateVector movement = StateVector::Constant(std::numeric_limits<double>::infinity());
     uint64_t frames = 0, pairs_used = 0, pairs_skipped = 0;

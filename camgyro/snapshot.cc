@@ -67,6 +67,7 @@ Snapshot MakeSnapshot(const OnlineCalibration::Progress& progress,
   next.pairs_used = progress.pairs_used;
   next.pairs_skipped = progress.pairs_skipped;
   next.starts = progress.starts;
+  next.lens = progress.lens;
   if (progress.frame_stamps) next.frame_stamps = DescribeStamps(*progress.frame_stamps);
   if (progress.estimate) FillEstimate(progress, options, &next);
   return next;

@@ -45,6 +45,7 @@ TEST(Calibrator, FindsTheTruthAndSaysWhenItIsReady) {
   EXPECT_EQ(snapshot->pairs_skipped, 0u);
   EXPECT_NEAR(snapshot->noise_px, 0.3, 0.05);
   EXPECT_LT(snapshot->wrong_ratio, 5e-3);
+  EXPECT_EQ(snapshot->lens, "");
   const Calibration& c = snapshot->calibration;
   const auto& p = snapshot->parameters;
   EXPECT_LT(Sigmas(c.focal_px, s.truth.lens[camgyro::kFocal], p[kFocal]), 4.0);
@@ -261,6 +262,21 @@ TEST(Calibrator, TakesInALensThatNobodyDeclared) {
   const Calibration& c = snapshot->calibration;
   EXPECT_NEAR(c.distortion[0], -0.28, 0.03);
   EXPECT_LT(Sigmas(c.focal_px, s.truth.lens[camgyro::kFocal], snapshot->parameters[kFocal]), 4.5);
+  EXPECT_THAT(snapshot->lens, testing::HasSubstr("nothing declares"));
+}
+
+TEST(Calibrator, LeavesOutADistortionThatIsOfAnotherCamera) {
+  const Scenario scenario = RoomThroughALens();
+  Simulated s = simulation::SimulateTracks(scenario).value();
+  CalibratorOptions options = OptionsFor(scenario);
+  options.camera.focal_px = scenario.camera.focal_px;
+  options.camera.distortion = {-0.10, 0.0, 0.0, 0.0};
+  s.recording.frames.resize(180);  // 6 s, for the start
+  s.recording.tracks.resize(180);
+  const auto calibrator = Make(options);
+  Feed(calibrator.get(), s.recording);
+  ASSERT_TRUE(calibrator->WaitUntilIdle(600.0));
+  EXPECT_THAT(calibrator->snapshot()->lens, testing::HasSubstr("is not that of this camera"));
 }
 
 // A phone in portrait, whose sensor's rows are the columns of its pictures.
