@@ -3,7 +3,9 @@
 places, and prints how the errors compare with sigma_total:
 
     tools/random_faults.py [--seeds A-B] [--duration S] [--motions NAME,...] [--faults NAME,...]
-                           [--jobs N] [--camgyro PATH] [KEY=VALUE ...]
+                           [--jobs N] [--camgyro PATH] [--library PREPARE_VIO] [KEY=VALUE ...]
+
+--library: with the library, through this build of examples/recording, instead of `calibrate`.
 
 The devices have no effect that the model lacks, and nobody declares the fault. KEY=VALUE changes
 the scenario of all recordings, as in `camgyro simulate`. Prints a row for each fault: recordings
@@ -210,8 +212,9 @@ def run(options, fault, seed):
                 late_s = mean_lateness_s(stamps_ns, recorded.stamps_ns)
             recorded.write()
         begin_s = time.monotonic()
-        done = subprocess.run([options.camgyro, "calibrate", recording, "--out", out],
-                              capture_output=True, text=True, check=False)
+        command = ([options.library, recording, out] if options.library else
+                   [options.camgyro, "calibrate", recording, "--out", out])
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         result = {"name": "%s %d" % (motion, seed), "seconds": time.monotonic() - begin_s,
                   "says": [line for line in done.stdout.split("\n") if line.startswith("doubt")]}
         if not os.path.exists(out + "/calibration.yaml"):
@@ -222,11 +225,13 @@ def run(options, fault, seed):
         with open(recording + "/truth.yaml", encoding="utf-8") as file:
             truth = yaml.safe_load(file)
         truth["clock"]["delay_s"]["value"] -= late_s
-        result["fitted"] = ["%s:%s" % (e["name"], e["shape"]) for e in calibration["effects"]]
+        result["fitted"] = ["%s:%s" % (e["name"], e["shape"]) for e in calibration.get("effects", [])]
         error, noise = errors(calibration, truth)
         unknown = calibration["quality"]["unobservable"]
         used = np.array([name not in unknown for name in calibration["covariance"]["order"]])
-        total = np.sqrt(np.diag(np.array(calibration["covariance"]["total"])))
+        total = noise  # of a library that has not come so far as to find it
+        if "total" in calibration["covariance"]:
+            total = np.sqrt(np.diag(np.array(calibration["covariance"]["total"])))
         result.update(error=error, used=used, z=np.where(used, error / total, np.nan),
                       z_noise=np.where(used, error / noise, np.nan))
         return result
@@ -270,6 +275,7 @@ def main():
     parser.add_argument("--faults", help="those whose name contains one of these words")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
+    parser.add_argument("--library")
     parser.add_argument("changes", nargs="*", metavar="KEY=VALUE")
     options = parser.parse_args()
     options.motions = options.motions.split(",")

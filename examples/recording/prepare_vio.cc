@@ -148,6 +148,7 @@ int main(int argc, char** argv) {
     std::cerr << folder << ": cannot be written\n";
     return 3;
   }
+  if (!snapshot->lens.empty()) std::cout << "lens: " << snapshot->lens << "\n";
   if (!snapshot->doubt.empty()) std::cout << "doubt: " << snapshot->doubt << "\n";
   std::cout << (snapshot->ready ? "ready" : "not all parameters are ready: see readiness.csv")
             << "\n";
