@@ -24,6 +24,11 @@ void DisbelieveFit(bool ran_away, CalibrationReport* report);
 // more than kNoiseOfAstray): nothing is determined, and a doubt says why.
 void DisbelievePulledFit(CalibrationReport* report);
 
+// How many times as much (rms) frames leave that the fit has not seen as those that it has, beyond
+// what the gyro's noise turns them by; both per degree of freedom, without the worst tenth of the
+// pairs, so that it is 1 with the right model. 0: nothing was unseen.
+double UnseenRatio(const CalibrationReport& report);
+
 // Adds to doubts and notes what speaks against a result that is complete otherwise.
 void AddDoubts(const Recording& recording, CalibrationReport* report);
 

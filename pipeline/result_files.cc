@@ -13,6 +13,7 @@
 
 #include "core/standard_distortion.h"
 #include "core/time.h"
+#include "estimator/doubts.h"
 
 namespace camgyro {
 namespace {
@@ -165,6 +166,7 @@ void EmitQuality(YAML::Emitter& out, const CalibrationReport& report, bool attit
   out << YAML::Key << (attitudes ? "rms_rad" : "rms_px") << YAML::Value << quality.rms_px;
   if (report.unseen) {
     out << YAML::Key << "unseen_rms_px" << YAML::Value << report.unseen->rms_px;
+    out << YAML::Key << "unseen_ratio" << YAML::Value << UnseenRatio(report);
   }
   if (report.halves_chi2 > 0.0) {
     out << YAML::Key << "halves_chi2" << YAML::Value << report.halves_chi2;

@@ -13,7 +13,8 @@ that were calibrated and whose focal length, readout time and delay are all dete
 determined parameters within 3 sigma_total, their rms errors in sigma_total and in sigmas of noise,
 the medians of the errors' size of f, t_r and t_d, the recordings with a doubt, and the time of a
 calibration. Below the table: errors beyond 3 sigma_total, refusals, effects that
-the program fitted of its own accord, and doubts, one line each.
+the program fitted of its own accord, and doubts, one line each, and what frames that a fit has not
+seen leave over those that it has (quality: unseen_ratio).
 """
 import argparse
 import os
@@ -225,6 +226,7 @@ def run(options, fault, seed):
         with open(recording + "/truth.yaml", encoding="utf-8") as file:
             truth = yaml.safe_load(file)
         truth["clock"]["delay_s"]["value"] -= late_s
+        result["unseen"] = calibration["quality"].get("unseen_ratio", 0.0)
         result["fitted"] = ["%s:%s" % (e["name"], e["shape"]) for e in calibration.get("effects", [])]
         error, noise = errors(calibration, truth)
         unknown = calibration["quality"]["unobservable"]
@@ -253,6 +255,10 @@ def print_row(fault, results):
     print("| %s | %d of %d | %s | %d | %.1f |" % (
         fault, good, len(results), " | ".join(cells), sum(bool(r["says"]) for r in results),
         np.median([r["seconds"] for r in results])), flush=True)
+    ratios = [r["unseen"] for r in found if r["unseen"] > 0]
+    if ratios:
+        notes.append("%s: unseen frames leave %.2f to %.2f times what seen ones do" % (
+            fault, min(ratios), max(ratios)))
     for r in found:
         off = [pair for pair in zip(NAMES, r["z"]) if abs(pair[1]) > 3]
         if off:

@@ -50,10 +50,13 @@ TEST(Doubts, UnseenFramesThatFitWorseBeyondTheGyrosNoise) {
     report.calibration = s.truth;
     report.quality.usual_rms_px = 0.5;
     report.unseen = UnseenFit{100, 5000, 5.0, unseen_px, gyro_px};
+    EXPECT_NEAR(0.5 * UnseenRatio(report),
+                std::sqrt(std::max(0.0, unseen_px * unseen_px - gyro_px * gyro_px)), 1e-12);
     AddDoubts(s.recording, &report);
     return report.doubts;
   };
-  EXPECT_THAT(doubts_of(0.6, 0.0), ::testing::IsEmpty());
+  EXPECT_THAT(doubts_of(0.58, 0.0), ::testing::IsEmpty());
+  EXPECT_THAT(doubts_of(0.62, 0.0), ::testing::ElementsAre(::testing::HasSubstr("fit worse")));
   EXPECT_THAT(doubts_of(0.8, 0.1), ::testing::ElementsAre(::testing::HasSubstr("fit worse")));
   EXPECT_THAT(doubts_of(0.8, 0.7), ::testing::IsEmpty());
 }
