@@ -83,11 +83,14 @@ constexpr int kLeastPairs = 10;
 constexpr int kRoundsToGetLost = 2;
 
 // Without parallax many directions fit a pair equally well; which one fits best changes with every
-// step of the state, and the state with them: it may wander for ever by half a sigma in each round
-// (Refinement.SettlesWhereDirectionsMeanNothing). After so many rounds, a direction is left only
-// for one that saves what a wrong match costs, then twice as much, and so on. Not from the first
-// round on, which makes the errors in far scenes larger (docs/lab/pairs.md#directions-that-wander).
-constexpr int kRoundsOfFreeSearch = 4;
+// step of the state, and the state with them: it may wander for ever, by half a sigma to a whole
+// one in each round (Refinement.SettlesWhereDirectionsMeanNothing). After two rounds that move it
+// by no more than this (Mahalanobis distance), a direction is left only for one that saves what a
+// wrong match costs, then twice as much, and so on. Not while the state still goes somewhere, by
+// more in a round: other directions are what it takes then
+// (docs/lab/pairs.md#directions-that-wander).
+constexpr double kWandering = 1.5;
+constexpr int kRoundsOfWandering = 2;
 
 double KeptBytes(const std::vector<TimedPair>& pairs, const PairGraphOptions& options) {
   double bytes = 0.0;
@@ -143,6 +146,9 @@ class Refinement {
       const auto residuals = AllResiduals(/*search=*/false);
       const Noise next = NextNoise(residuals);
       result_.calibration = graph_->Estimate();
+      std::optional<double> moved;
+      if (yardstick_) moved = yardstick_->Distance(before, result_.calibration);
+      if (moved) wandering_rounds_ = *moved < kWandering ? wandering_rounds_ + 1 : 0;
       const bool lost = IsLost(before, next.scale);
       const bool last = lost || result_.rounds == options_.max_rounds;
       scale_settled_ = SameNoise(next) && spread_settled;
@@ -151,10 +157,8 @@ class Refinement {
         continue;
       }
       // Where the next round would start from is not worth a covariance; the end is.
-      const bool settled = options_.frame_times_alone
-                               ? solved_finely_
-                               : yardstick_ && yardstick_->Distance(before, result_.calibration) <
-                                                   options_.settled_round;
+      const bool settled =
+          options_.frame_times_alone ? solved_finely_ : moved && *moved < options_.settled_round;
       if (!settled && !last) continue;
       if (const Status judged = Judge(before, residuals); !judged) {
         return tl::unexpected(judged.error());
@@ -315,8 +319,8 @@ class Refinement {
 
   // By how much another direction has to fit a pair better [sigmas^2].
   double LeastGainOfDirection() const {
-    const int more = result_.rounds - kRoundsOfFreeSearch;
-    return more <= 0 ? 0.0 : std::ldexp(std::pow(graph_options_.inlier_sigmas(), 2), more - 1);
+    const int more = wandering_rounds_ - kRoundsOfWandering;
+    return more < 0 ? 0.0 : std::ldexp(std::pow(graph_options_.inlier_sigmas(), 2), more);
   }
 
   // Covariance, quality, and whether the last round has moved the estimate.
@@ -370,6 +374,7 @@ class Refinement {
   Noise noise_now_;
   bool scale_settled_ = false, solved_finely_ = false;
   std::optional<Yardstick> yardstick_;
+  int wandering_rounds_ = 0;  // in a row, as far as rounds have a yardstick
   Refined result_;
 };
 
