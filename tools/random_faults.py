@@ -5,7 +5,8 @@ places, and prints how the errors compare with sigma_total:
     tools/random_faults.py [--seeds A-B] [--duration S] [--motions NAME,...] [--faults NAME,...]
                            [--jobs N] [--camgyro PATH] [--library PREPARE_VIO] [KEY=VALUE ...]
 
---library: with the library, through this build of examples/recording, instead of `calibrate`.
+--library: with the library, through this build of examples/recording, instead of `calibrate`; its
+sigma_total is that of noise where it has not come so far as to find it.
 
 The devices have no effect that the model lacks, and nobody declares the fault. KEY=VALUE changes
 the scenario of all recordings, as in `camgyro simulate`. Prints a row for each fault: recordings
@@ -226,7 +227,7 @@ def run(options, fault, seed):
         with open(recording + "/truth.yaml", encoding="utf-8") as file:
             truth = yaml.safe_load(file)
         truth["clock"]["delay_s"]["value"] -= late_s
-        result["unseen"] = calibration["quality"].get("unseen_ratio", 0.0)
+        result["unseen"] = calibration["quality"].get("unseen_ratio")
         result["fitted"] = ["%s:%s" % (e["name"], e["shape"]) for e in calibration.get("effects", [])]
         error, noise = errors(calibration, truth)
         unknown = calibration["quality"]["unobservable"]
@@ -255,7 +256,7 @@ def print_row(fault, results):
     print("| %s | %d of %d | %s | %d | %.1f |" % (
         fault, good, len(results), " | ".join(cells), sum(bool(r["says"]) for r in results),
         np.median([r["seconds"] for r in results])), flush=True)
-    ratios = [r["unseen"] for r in found if r["unseen"] > 0]
+    ratios = [r["unseen"] for r in found if r["unseen"] is not None]
     if ratios:
         notes.append("%s: unseen frames leave %.2f to %.2f times what seen ones do" % (
             fault, min(ratios), max(ratios)))

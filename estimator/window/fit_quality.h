@@ -54,7 +54,7 @@ class FitSum {
 
 // Residuals of pairs that a fit has not seen: rates from the gyro with the calibration's bias, the
 // direction of each pair (and its frames' own times, if they have any) from every other match,
-// residuals from the rest, less what the direction's own error lets expect (PredictedResiduals):
+// residuals from the rest, over what the direction's own error lets expect (PredictedResiduals):
 // with few matches it is as large as the noise. A transfer has no direction: residuals from all
 // matches.
 struct UnseenFit {

@@ -102,7 +102,8 @@ class PairResidual {
                        const Calibration& calibration, double noise,
                        const PairGraphOptions& options, PairView* view,
                        std::vector<MatchMisfit>* misfits) const;
-  // Independent residuals of those matches that have had no say in the pair's direction.
+  // Independent residuals of those matches that have had no say in the pair's direction, in sigmas
+  // of what noise lets expect, the error of that direction included.
   virtual bool Unseen(const EstimationInput& input, const TimedPair& pair,
                       const Calibration& calibration, double noise, const PairGraphOptions& options,
                       std::vector<double>* residuals) const;
