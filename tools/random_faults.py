@@ -3,10 +3,12 @@
 places, and prints how the errors compare with sigma_total:
 
     tools/random_faults.py [--seeds A-B] [--duration S] [--motions NAME,...] [--faults NAME,...]
-                           [--jobs N] [--camgyro PATH] [--library PREPARE_VIO] [KEY=VALUE ...]
+                           [--jobs N] [--camgyro PATH] [--library PREPARE_VIO | --diagnose]
+                           [KEY=VALUE ...]
 
 --library: with the library, through this build of examples/recording, instead of `calibrate`; its
-sigma_total is that of noise where it has not come so far as to find it.
+sigma_total is that of noise where it has not come so far as to find it. --diagnose: with `diagnose`,
+whose effects and structure that none explains are printed too: whether it takes a fault for one.
 
 The devices have no effect that the model lacks, and nobody declares the fault. KEY=VALUE changes
 the scenario of all recordings, as in `camgyro simulate`. Prints a row for each fault: recordings
@@ -194,6 +196,20 @@ FAULTS = {
 }
 
 
+def read(path):
+    with open(path, encoding="utf-8") as file:
+        return yaml.safe_load(file)
+
+
+def judgement(diagnosis):
+    """What a diagnosis has found, in lines."""
+    lines = ["added: %s (%s)" % (r["added"], r["candidates"][0]["shape"])
+             for r in diagnosis["rounds"] if r["added"] != "none"]
+    if diagnosis["verdict"]["unexplained_structure"]:
+        lines.append("structure that no effect explains")
+    return lines
+
+
 def run(options, fault, seed):
     motion = options.motions[seed % len(options.motions)]
     with tempfile.TemporaryDirectory() as folder:
@@ -215,20 +231,20 @@ def run(options, fault, seed):
             recorded.write()
         begin_s = time.monotonic()
         command = ([options.library, recording, out] if options.library else
-                   [options.camgyro, "calibrate", recording, "--out", out])
+                   [options.camgyro, "diagnose" if options.diagnose else "calibrate", recording,
+                    "--out", out])
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         result = {"name": "%s %d" % (motion, seed), "seconds": time.monotonic() - begin_s,
                   "says": [line for line in done.stdout.split("\n") if line.startswith("doubt")]}
         if not os.path.exists(out + "/calibration.yaml"):
             result["refused"] = done.stderr.strip().split("\n")[-1]
             return result
-        with open(out + "/calibration.yaml", encoding="utf-8") as file:
-            calibration = yaml.safe_load(file)
-        with open(recording + "/truth.yaml", encoding="utf-8") as file:
-            truth = yaml.safe_load(file)
+        calibration, truth = read(out + "/calibration.yaml"), read(recording + "/truth.yaml")
         truth["clock"]["delay_s"]["value"] -= late_s
         result["unseen"] = calibration["quality"].get("unseen_ratio")
         result["fitted"] = ["%s:%s" % (e["name"], e["shape"]) for e in calibration.get("effects", [])]
+        if options.diagnose:
+            result["says"] += judgement(read(out + "/diagnosis.yaml"))
         error, noise = errors(calibration, truth)
         unknown = calibration["quality"]["unobservable"]
         used = np.array([name not in unknown for name in calibration["covariance"]["order"]])
@@ -283,6 +299,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--camgyro", default=SOURCE + "/build/release/tools/camgyro")
     parser.add_argument("--library")
+    parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("changes", nargs="*", metavar="KEY=VALUE")
     options = parser.parse_args()
     options.motions = options.motions.split(",")

@@ -71,7 +71,7 @@ EstimationInput OutlineOf(const Recording& recording, const PairSelection& selec
     }
   } else if (!recording.tracks.empty()) {
     const int n = static_cast<int>(recording.tracks.size());
-    for (int a = 0; a + selection.gap < n; a += selection.stride) {
+    for (const int a : FirstFrames(selection, n, PairsLoseTheirStep(recording.camera_stamps))) {
       const int b = a + selection.gap;
       add(a, b).num_matches = CountMatches(recording.tracks[static_cast<size_t>(a)],
                                            recording.tracks[static_cast<size_t>(b)]);

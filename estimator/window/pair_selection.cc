@@ -31,6 +31,24 @@ double UnsmoothVariance(const Recording& recording, int gap) {
 
 }  // namespace
 
+std::vector<int> FirstFrames(const PairSelection& selection, int frames, bool lose_step) {
+  const int gap = selection.gap, stride = selection.stride;
+  std::vector<int> first;
+  if (!lose_step || stride == 1) {
+    for (int a = 0; a + gap < frames; a += stride) first.push_back(a);
+    return first;
+  }
+  const bool overlap = !selection.leaves_frames_out();
+  int begin = 0;
+  for (int stretch = 1; begin + gap < frames; ++stretch) {
+    const int end = overlap ? std::min(begin + gap, frames - gap) : begin + 1;
+    for (int a = begin; a < end; a += std::max(1, stride / 2)) first.push_back(a);
+    begin += overlap ? std::max(2 * gap, stride) : gap;
+    if (stretch % kPairsInStep == 0) ++begin;
+  }
+  return first;
+}
+
 double ParallaxPerFrame(const Recording& recording, int gap) {
   const double near = UnsmoothVariance(recording, 1), far = UnsmoothVariance(recording, gap);
   if (near < 0.0 || far < 0.0) return std::numeric_limits<double>::infinity();

@@ -25,14 +25,21 @@ struct PairSelection {
   bool leaves_frames_out() const { return gap > 1 && stride == gap; }
 };
 
-// Where stamps are not a steady clock's, estimators that go along leave out a frame after so many
-// pairs, if those have frames in between. Pairs that begin at every sixth frame, say, would always
-// see the same of what repeats with every second or third one, as stamps that are rounded to 5 ms
-// do at 30 frames/s: no scatter, but an error of focal length and delay.
+// Where stamps are not a steady clock's, a frame is left out after so many pairs, or stretches of
+// pairs that overlap. Pairs that begin at every sixth frame, say, would always see the same of what
+// repeats with every second or third one, as stamps that are rounded to 5 ms do at 30 frames/s: no
+// scatter, but an error of focal length and delay.
 constexpr int kPairsInStep = 3;
 inline bool PairsLoseTheirStep(const std::optional<StampReport>& camera_stamps) {
   return camera_stamps && camera_stamps->kind != StampKind::kMeasured;
 }
+
+// The first frames of the pairs in a recording of so many frames, ascending: every stride-th one,
+// or, where pairs lose their step, in stretches of twice the gap, whose first half is paired with
+// the second one. An odd gap from even frames alone would always lead to an odd one; where every
+// other stamp is late, all pairs would be longer than they say, or all shorter
+// (docs/lab/pairs.md#stamps-that-alternate). No frame is in two pairs then either.
+std::vector<int> FirstFrames(const PairSelection& selection, int frames, bool lose_step);
 
 constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
 
@@ -59,7 +66,8 @@ constexpr GapLimits kGapLimitsOfPoorStart{std::numeric_limits<int>::max(), 100, 
 // keeps 60 % of the neighbours' matches and leaves enough pairs; where things are so far away, or
 // so equally far, that parallaxes differ by less than kLeastParallax there, the shortest gap at
 // which they do, or as long as the limits allow. No two pairs share noise: gaps are odd and pairs
-// begin at even frames, so that every observation is in one pair. Neighbours without tracks.
+// begin at even frames (but see FirstFrames), so that every observation is in one pair. Neighbours
+// without tracks.
 //
 // Where a tracker re-anchors at every frame (MatchNoise::kSecondImage), the error of a gap is the
 // sum of those of its frames: it grows as the root of the gap, slower than what is to be seen, and

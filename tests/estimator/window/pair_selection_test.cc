@@ -2,10 +2,15 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
+#include <memory>
 #include <set>
+#include <vector>
 
+#include "core/effects/catalogue.h"
 #include "estimator/window/estimation_input.h"
 #include "estimator/window/refinement.h"
 #include "tests/estimator/simulated_input.h"
@@ -71,6 +76,63 @@ TEST(SelectPairs, GapsOfFastCamerasTakeAsLong) {
         SelectPairs(recording, {/*gap=*/48, /*least_pairs=*/20}).gap / rate_hz;
     EXPECT_NEAR(of_chain_s, 0.1, 0.01);
   }
+}
+
+TEST(FirstFrames, LeadFromEvenAndOddFramesAlikeWhereStepsAreLost) {
+  constexpr int kFrames = 2001;
+  for (const PairSelection& selection :
+       {PairSelection{5, 2}, PairSelection{3, 2}, PairSelection{21, 4}, PairSelection{1, 2},
+        PairSelection{1, 6}, PairSelection{3, 3}, PairSelection{2, 2}}) {
+    SCOPED_TRACE(testing::Message() << selection.gap << " " << selection.stride);
+    std::vector<int> every;
+    for (int a = 0; a + selection.gap < kFrames; a += selection.stride) every.push_back(a);
+    EXPECT_EQ(FirstFrames(selection, kFrames, /*lose_step=*/false), every);
+
+    const std::vector<int> first = FirstFrames(selection, kFrames, /*lose_step=*/true);
+    EXPECT_GT(first.size(), 0.8 * static_cast<double>(every.size()));
+    EXPECT_LT(first.size(), 1.3 * static_cast<double>(every.size()));
+    const auto even = std::count_if(first.begin(), first.end(), [](int a) { return a % 2 == 0; });
+    // Chains of three frames a pair alternate by themselves, but for the frames that are left out.
+    EXPECT_NEAR(static_cast<double>(even) / static_cast<double>(first.size()), 0.5,
+                selection.leaves_frames_out() ? 0.17 : 0.06);
+    EXPECT_TRUE(std::is_sorted(first.begin(), first.end()));
+    EXPECT_LT(first.back() + selection.gap, kFrames);
+    std::set<int> seen;
+    for (const int a : first) {
+      EXPECT_TRUE(seen.insert(a).second || selection.leaves_frames_out());
+      EXPECT_TRUE(seen.insert(a + selection.gap).second);
+    }
+  }
+}
+
+// Every other stamp is 8 ms late, as where a screen's clock holds pictures back. From even frames
+// alone, all pairs are longer than they say, by a time that is no chance.
+TEST(FirstFrames, LeaveTheFocalLengthAloneWhereStampsAlternate) {
+  Scenario scenario = ShortScenario(12.0);
+  scenario.seed = 3;
+  scenario.tracks.noise_px = 0.3;
+  simulation::Simulated s = SimulateTracks(scenario).value();
+  for (size_t i = 1; i < s.recording.frames.size(); i += 2) {
+    s.recording.frames[i].stamp_ns += 8'000'000;
+  }
+  s.recording.camera_stamps.emplace();
+  double errors[2] = {0.0, 0.0};  // from even frames alone, as selected [sigmas of f]
+  for (const bool lose_step : {false, true}) {
+    s.recording.camera_stamps->kind = lose_step ? StampKind::kArrival : StampKind::kMeasured;
+    const EstimationInput input = MakeEstimationInput(s.recording, {5, 2});
+    const Prior prior = StartOffTheTruth(s.truth);
+    Calibration start = prior.mean;
+    start.effects = std::make_shared<const EffectSet>(
+        MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+    start.effect_values = Eigen::VectorXd::Zero(start.effects->size());
+    const Result<Refined> refined = Refine(input, input.pairs, start, prior, {});
+    ASSERT_TRUE(refined.has_value()) << refined.error().message;
+    errors[lose_step ? 1 : 0] = std::abs(refined->calibration.lens[kFocal] - s.truth.lens[kFocal]) /
+                                refined->calibration.sigma()[kFocal];
+    std::printf("lose_step %d: %.2f sigmas\n", lose_step, errors[lose_step ? 1 : 0]);
+  }
+  EXPECT_GT(errors[0], 3.0);
+  EXPECT_LT(errors[1], 2.0);
 }
 
 // Far things, or all equally far: the gap has parallaxes that differ, or is as long as it may be.
