@@ -39,12 +39,15 @@ std::vector<int> FirstFrames(const PairSelection& selection, int frames, bool lo
     return first;
   }
   const bool overlap = !selection.leaves_frames_out();
+  // Pairs of a chain tell of their common frames' times together: it is broken less often.
+  constexpr int kPairsOfChain = 16;
+  const int in_step = overlap ? kPairsInStep : kPairsOfChain;
   int begin = 0;
   for (int stretch = 1; begin + gap < frames; ++stretch) {
     const int end = overlap ? std::min(begin + gap, frames - gap) : begin + 1;
     for (int a = begin; a < end; a += std::max(1, stride / 2)) first.push_back(a);
     begin += overlap ? std::max(2 * gap, stride) : gap;
-    if (stretch % kPairsInStep == 0) ++begin;
+    if (stretch % in_step == 0) ++begin;
   }
   return first;
 }
