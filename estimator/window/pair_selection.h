@@ -38,7 +38,8 @@ inline bool PairsLoseTheirStep(const std::optional<StampReport>& camera_stamps) 
 // or, where pairs lose their step, in stretches of twice the gap, whose first half is paired with
 // the second one. An odd gap from even frames alone would always lead to an odd one; where every
 // other stamp is late, all pairs would be longer than they say, or all shorter
-// (docs/lab/pairs.md#stamps-that-alternate). No frame is in two pairs then either.
+// (docs/lab/pairs.md#stamps-that-alternate). A chain (leaves_frames_out) stays one, with a frame
+// left out more rarely; other pairs have no frame in common then either.
 std::vector<int> FirstFrames(const PairSelection& selection, int frames, bool lose_step);
 
 constexpr double kLeastMatchesOfGap = 0.6;  // of the neighbours' matches
