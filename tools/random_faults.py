@@ -4,11 +4,12 @@ places, and prints how the errors compare with sigma_total:
 
     tools/random_faults.py [--seeds A-B] [--duration S] [--motions NAME,...] [--faults NAME,...]
                            [--jobs N] [--camgyro PATH] [--library PREPARE_VIO | --diagnose]
-                           [KEY=VALUE ...]
+                           [--keep DIR] [KEY=VALUE ...]
 
 --library: with the library, through this build of examples/recording, instead of `calibrate`; its
 sigma_total is that of noise where it has not come so far as to find it. --diagnose: with `diagnose`,
 whose effects and structure that none explains are printed too: whether it takes a fault for one.
+--keep: every recording and what was made of it stay in DIR/NUMBER_OF_FAULT/MOTION_SEED.
 
 The devices have no effect that the model lacks, and nobody declares the fault. KEY=VALUE changes
 the scenario of all recordings, as in `camgyro simulate`. Prints a row for each fault: recordings
@@ -20,6 +21,7 @@ the program fitted of its own accord, and doubts, one line each, and what frames
 seen leave over those that it has (quality: unseen_ratio).
 """
 import argparse
+import contextlib
 import os
 import subprocess
 import tempfile
@@ -210,9 +212,17 @@ def judgement(diagnosis):
     return lines
 
 
+def folder_of(options, name):
+    if not options.keep:
+        return tempfile.TemporaryDirectory()
+    folder = os.path.join(options.keep, name)
+    os.makedirs(folder, exist_ok=True)
+    return contextlib.nullcontext(folder)
+
+
 def run(options, fault, seed):
     motion = options.motions[seed % len(options.motions)]
-    with tempfile.TemporaryDirectory() as folder:
+    with folder_of(options, "%d/%s_%d" % (list(FAULTS).index(fault), motion, seed)) as folder:
         recording, out = folder + "/recording", folder + "/out"
         with open(folder + "/scenario.yaml", "w", encoding="utf-8") as file:
             yaml.safe_dump({"seed": seed, "duration_s": options.duration, "motion": {"kind": motion},
@@ -301,6 +311,7 @@ def main():
     program = parser.add_mutually_exclusive_group()
     program.add_argument("--library")
     program.add_argument("--diagnose", action="store_true")
+    parser.add_argument("--keep")
     parser.add_argument("changes", nargs="*", metavar="KEY=VALUE")
     options = parser.parse_args()
     options.motions = options.motions.split(",")
