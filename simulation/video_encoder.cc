@@ -6,6 +6,7 @@ extern "C" {
 #include <libavutil/opt.h>
 }
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -27,6 +28,7 @@ struct VideoEncoder::Impl {
   AVPacket* packet = nullptr;
   std::optional<int64_t> first_ns;
   int64_t interval = 0;  // nominal, in kTimeBase
+  int64_t last = -1;     // time of the last picture, in kTimeBase
 
   ~Impl() {
     av_packet_free(&packet);
@@ -112,7 +114,10 @@ Status VideoEncoder::Write(const cv::Mat& gray, int64_t stamp_ns) {
                 static_cast<size_t>(frame->linesize[plane]) * static_cast<size_t>(gray.rows / 2));
   }
   if (!impl_->first_ns) impl_->first_ns = stamp_ns;
-  frame->pts = av_rescale_q(stamp_ns - *impl_->first_ns, kNanoseconds, kTimeBase);
+  // Of two that came within 11 us of each other, the second is a unit later: no file has two
+  // pictures of one time.
+  frame->pts = impl_->last =
+      std::max(impl_->last + 1, av_rescale_q(stamp_ns - *impl_->first_ns, kNanoseconds, kTimeBase));
   return Send(/*flush=*/false);
 }
 

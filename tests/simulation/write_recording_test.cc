@@ -2,11 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <opencv2/core.hpp>
 #include <sstream>
+#include <vector>
 
 #include "frontend/frame_source.h"
 #include "frontend/readers/read_recording.h"
@@ -165,6 +167,23 @@ TEST_F(WriteRecordingTest, VideoReadsBackAsRendered) {
     ASSERT_TRUE((*frames)->Next(&decoded).value());
     EXPECT_GT(cv::PSNR(renderer.Render(i), decoded), 33.0);  // H.264 at crf 18
   }
+}
+
+// Latencies as long as the interval: frames that waited for one arrive with it, 1 us apart, which
+// is less than the video's unit of time.
+TEST_F(WriteRecordingTest, VideoOfFramesThatCameTogetherReadsBack) {
+  Scenario scenario = ParseScenario(kVideo).value();
+  scenario.effects.frame_stamp_jitter.latency_s = 0.03;
+  const Simulated s = SimulateSensors(scenario).value();
+  const std::vector<Frame>& frames = s.recording.frames;
+  EXPECT_TRUE(std::adjacent_find(frames.begin(), frames.end(), [](const Frame& a, const Frame& b) {
+                return b.stamp_ns - a.stamp_ns == 1000;
+              }) != frames.end());
+  const Status written = WriteRecording(s, scenario, Folder("out"));
+  ASSERT_TRUE(written) << written.error().message;
+  const Result<Recording> recording = ReadRecording(Folder("out"));
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_EQ(recording->frames.size(), frames.size());
 }
 
 TEST_F(WriteRecordingTest, TrajectoryCanBeTheMotionOfAnother) {

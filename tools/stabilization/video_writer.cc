@@ -1,5 +1,6 @@
 #include "tools/stabilization/video_writer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -27,6 +28,7 @@ struct VideoWriter::Impl {
   FfmpegPtr<AVPacket> packet{av_packet_alloc()};
   AVStream* video = nullptr;
   int64_t interval = 0;  // nominal, in kTimeBase
+  int64_t last = -1;     // time of the last picture, in kTimeBase
 
   FfmpegPtr<AVFormatContext> source;
   int sound_index = -1;  // in the source
@@ -212,7 +214,10 @@ Status VideoWriter::Write(const cv::Mat& i420, int64_t stamp_ns) {
                   static_cast<size_t>(columns));
     }
   }
-  frame->pts = av_rescale_q(stamp_ns, kNanoseconds, kTimeBase);
+  // Of two that came within 11 us of each other, the second is a unit later: no file has two
+  // pictures of one time.
+  frame->pts = impl_->last =
+      std::max(impl_->last + 1, av_rescale_q(stamp_ns, kNanoseconds, kTimeBase));
   return impl_->Send(/*flush=*/false);
 }
 
