@@ -29,6 +29,7 @@ from calibration_errors import NAMES, errors
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 MOTIONS = ("handheld", "walking", "running", "panning", "slow")
+PICTURES = "pictures"  # of a room, rendered and tracked, instead of a motion
 # Name: mean latency of the frames, mean latency and longest stall of the gyro's samples, and the
 # part of the frames' latency that wanders, with a correlation time of 1.5 s [ms].
 SIZES = {
@@ -98,15 +99,16 @@ def run(options, case):
     with tempfile.TemporaryDirectory() as folder:
         recording, out = folder + "/recording", folder + "/out"
         subprocess.run(
-            [options.camgyro, "simulate", SOURCE + "/tools/scenarios/motion_%s.yaml" % motion,
-             "seed=%d" % (SEEDS_APART * MOTIONS.index(motion) + seed),
+            [options.camgyro, "simulate", SOURCE + "/tools/scenarios/" +
+             ("video_room.yaml" if motion == PICTURES else "motion_%s.yaml" % motion),
+             "seed=%d" % (SEEDS_APART * (*MOTIONS, PICTURES).index(motion) + seed),
              "duration_s=%g" % options.duration, "tracks.noise_px=0.5",
              "tracks.outlier_fraction=0.02", "gyro.rate_hz=%g" % GYRO_HZ,
              "effects.frame_stamp_jitter.latency_s=%g" % (1e-3 * size[0]),
              "gyro.stamp_latency_s=%g" % (1e-3 * size[1]),
              "gyro.stamp_stall_s=%g" % (1e-3 * size[2]),
              "effects.frame_stamp_jitter.wander_s=%g" % (1e-3 * sum(size[3:])), "--out", recording],
-            check=True, stdout=subprocess.DEVNULL)
+            check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         done = subprocess.run([options.camgyro, "calibrate", recording, "--out", out, "--quiet"],
                               capture_output=True, text=True, check=False)
         result = dict(size=name, motion=motion, seed=seed, exit=done.returncode)
@@ -182,7 +184,7 @@ def print_tables(rows):
         print(row_of(size, [r for r in rows if r["size"] == size]))
     print("\n" + HEAD % "Latency [ms], motion")
     for size in sizes:
-        for motion in MOTIONS:
+        for motion in (*MOTIONS, PICTURES):
             of = [r for r in rows if r["size"] == size and r["motion"] == motion]
             if of:
                 print(row_of(size + ", " + motion, of))
@@ -205,7 +207,7 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", default="1-10")
     parser.add_argument("--sizes", default=";".join(SIZES), help="separated by semicolons")
-    parser.add_argument("--motions", default=",".join(MOTIONS))
+    parser.add_argument("--motions", default=",".join(MOTIONS), help="and '%s'" % PICTURES)
     parser.add_argument("--duration", type=float, default=20.0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--store", default=SOURCE + "/build/stamps.jsonl")

@@ -6,104 +6,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "core/linear_algebra.h"
 #include "core/parallel.h"
 #include "core/robust_statistics.h"
-#include "estimator/window/kept_cost.h"
+#include "estimator/window/local_equations.h"
 #include "estimator/window/pair_blocks.h"
 #include "estimator/window/pair_graph.h"
 #include "factors/frame_time_prior.h"
 #include "factors/robust.h"
 
 namespace camgyro {
-namespace {
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-// Normal equations of some factors by some blocks, the others held.
-class LocalEquations {
- public:
-  void AddBlock(const BlockId& id, const Block& block) {
-    if (columns_.emplace(id, size_).second) size_ += block.tangent_size();
-  }
-  void Begin() {
-    H_.setZero(size_, size_);
-    g_.setZero(size_);
-  }
-  void Add(const FactorGraph& graph, const Factor& factor) { Add(graph, factor, *factor.cost); }
-  // Where nothing of it is kept anyway: the cost function behind a KeptCost is asked for these
-  // blocks alone.
-  void AddAfresh(const FactorGraph& graph, const Factor& factor) {
-    const auto* const kept = dynamic_cast<const KeptCost*>(factor.cost.get());
-    Add(graph, factor, kept != nullptr ? kept->cost() : *factor.cost);
-  }
-  // More information about one number of a block.
-  void AddTo(const BlockId& id, double information, double score) {
-    H_(columns_.at(id), columns_.at(id)) += information;
-    g_[columns_.at(id)] += score;
-  }
-  // A step of Gauss and Newton.
-  void Step(FactorGraph* graph) const {
-    const Eigen::VectorXd step = -SymmetricSolver(H_).Solve(g_);
-    if (!step.allFinite()) return;
-    for (const auto& [id, at] : columns_) {
-      Eigen::Map<Eigen::VectorXd> value = graph->value(id);
-      if (graph->block(id).geometry == Geometry::kDirection) {
-        value = (value + TangentsOf(value) * step.segment<2>(at)).normalized();
-      } else {
-        value += step.segment(at, value.size());
-      }
-    }
-  }
-  const Eigen::MatrixXd& H() const { return H_; }
-  const Eigen::VectorXd& g() const { return g_; }
-
- private:
-  void Add(const FactorGraph& graph, const Factor& factor, const ceres::CostFunction& cost) {
-    std::vector<const double*> values;
-    std::vector<RowMajor> jacobians;
-    std::vector<double*> pointers;
-    const int rows = cost.num_residuals();
-    jacobians.reserve(factor.blocks.size());
-    for (const BlockId& id : factor.blocks) {
-      values.push_back(graph.value(id).data());
-      const bool wanted = columns_.count(id) > 0;
-      jacobians.emplace_back(wanted ? rows : 0, graph.value(id).size());
-      pointers.push_back(wanted ? jacobians.back().data() : nullptr);
-    }
-    Eigen::VectorXd r(rows);
-    if (!cost.Evaluate(values.data(), r.data(), pointers.data())) return;
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, size_);
-    for (size_t i = 0; i < factor.blocks.size(); ++i) {
-      if (pointers[i] == nullptr) continue;
-      const Block& block = graph.block(factor.blocks[i]);
-      const int at = columns_.at(factor.blocks[i]);
-      if (block.geometry == Geometry::kDirection) {
-        J.middleCols<2>(at) = jacobians[i] * TangentsOf(block.value);
-      } else {
-        J.middleCols(at, block.tangent_size()) = jacobians[i];
-      }
-    }
-    H_.noalias() += J.transpose() * J;
-    g_.noalias() += J.transpose() * r;
-  }
-
-  static Eigen::Matrix<double, 3, 2> TangentsOf(const Eigen::Vector3d& direction) {
-    Eigen::Matrix<double, 3, 2> basis;
-    basis.col(0) = direction.unitOrthogonal();
-    basis.col(1) = direction.cross(basis.col(0));
-    return basis;
-  }
-
-  std::map<BlockId, int> columns_;
-  int size_ = 0;
-  Eigen::MatrixXd H_;
-  Eigen::VectorXd g_;
-};
-
-}  // namespace
 
 int64_t PairGraph::FrameNumber(double stamp_s) { return std::llround(1e9 * stamp_s); }
 
@@ -276,17 +191,64 @@ bool PairGraph::SearchFrameTimesOf(int64_t id, const std::vector<int64_t>& touch
   return found;
 }
 
-void PairGraph::SearchFrameTimes() {
+void PairGraph::TakeTimesOfPairsAlone(const std::vector<double>& shares, double right_share,
+                                      const TimesAlone& alone) {
+  std::vector<std::optional<PairTimes>> found(pairs_.size());
+  ForAllPairs([&](size_t i, int64_t id, PairBearings*) {
+    if (shares[i] >= right_share) {
+      found[i] = FrameTimesOf(pairs_.at(id));
+    } else {
+      PairTimes times;
+      if (alone(id, &times)) found[i] = times;
+    }
+  });
+  std::vector<PairTimes> all;
+  for (const auto& times : found) {
+    if (times) all.push_back(*times);
+  }
+  std::map<BlockId, Eigen::VectorXd> before;
+  for (const auto& [id, pair] : pairs_) {
+    for (const BlockId& block : {DirectionBlock(id), BendBlock(id)}) {
+      before[block] = graph_.value(block);
+    }
+    for (const int64_t frame : pair.frame_times) {
+      before[FrameTimeBlock(frame)] = graph_.value(FrameTimeBlock(frame));
+    }
+  }
+  const auto cost = [&] {
+    const std::vector<std::vector<double>> residuals = AllResiduals(/*search=*/true);
+    double sum = 0.0;
+    size_t i = 0;
+    for (const auto& [id, pair] : pairs_) sum += CostOfTimes(id, pair, residuals[i++]);
+    return sum;
+  };
+  const double cost_before = cost();
+  for (const FrameOffset& frame : OffsetsOf(all, *frame_time_spread_s_)) {
+    graph_.value(FrameTimeBlock(frame.frame))[0] = frame.offset_s;
+  }
+  if (cost() < cost_before) return;
+  for (const auto& [block, value] : before) graph_.value(block) = value;
+}
+
+void PairGraph::SearchFrameTimes(const TimesAlone& alone) {
   // Of the share that pairs usually have: where so many matches are right, the times are as well.
   constexpr double kSurelyRight = 0.93;
   // Of the share when a search was in vain: it would be again. Both save time only.
   constexpr double kHardlyWorse = 0.9;
   if (!has_frame_times() || !residual().facts().has_direction) return;
   std::vector<double> shares(pairs_.size());
-  ForAllPairs(
-      [&](size_t i, int64_t id, PairBearings* bearings) { shares[i] = RightShare(id, bearings); });
+  const auto find_shares = [&] {
+    ForAllPairs([&](size_t i, int64_t id, PairBearings* bearings) {
+      shares[i] = RightShare(id, bearings);
+    });
+  };
+  find_shares();
   std::vector<double> sorted = shares;
   const double right_share = kSurelyRight * MedianInPlace(&sorted);
+  if (alone && *std::min_element(shares.begin(), shares.end()) < right_share) {
+    TakeTimesOfPairsAlone(shares, right_share, alone);
+    find_shares();
+  }
 
   std::map<int64_t, std::vector<int64_t>> pairs_of_frames;
   for (const auto& [id, pair] : pairs_) {

@@ -123,28 +123,41 @@ struct PlaneEquations {
   double cost = 0.0;
 };
 
-// One step of Gauss-Newton of the two frames' times, direction and bend free beside them.
-Eigen::Vector2d StepOfTimes(const PairView& view, const PairPlane& plane, double spread_s,
-                            size_t first, size_t step) {
-  const PairMeasurement& m = view.measurement;
-  const PlaneEquations equations(view, plane, first, step);
-  Eigen::Matrix2d H = Eigen::Matrix2d::Identity() / (spread_s * spread_s);
-  Eigen::Vector2d g = H * Eigen::Vector2d(m.frame_a.offset_s, m.frame_b.offset_s);
-  Eigen::Matrix<double, 8, 2> mixed = Eigen::Matrix<double, 8, 2>::Zero();
-  for (size_t i = first; i < m.matches.size(); i += step) {
-    const PlaneResidual r = ResidualOf(view, plane, i);
-    const RobustResidual robust = Robustify(r.value, m.robust_threshold);
-    const Eigen::Vector2d by_times =
-        robust.derivative * Eigen::Vector2d(ByTime(view.bearings.a[i], r.by_a, r.by_J_a),
-                                            ByTime(view.bearings.b[i], r.by_b, r.by_J_b));
-    mixed += equations.RowOf(view, r, robust, i) * by_times.transpose();
-    H += by_times * by_times.transpose();
-    g += robust.value * by_times;
+// What the matches first, first + step, ... say of the two frames' times, about those of the view,
+// direction and bend free beside them: half of chi2's gradient [1/s], and its curvature [1/s^2].
+struct TimesEquations {
+  TimesEquations(const PairView& view, const PairPlane& plane, size_t first, size_t step) {
+    const PairMeasurement& m = view.measurement;
+    const PlaneEquations equations(view, plane, first, step);
+    Eigen::Matrix<double, 8, 2> mixed = Eigen::Matrix<double, 8, 2>::Zero();
+    for (size_t i = first; i < m.matches.size(); i += step) {
+      const PlaneResidual r = ResidualOf(view, plane, i);
+      const RobustResidual robust = Robustify(r.value, m.robust_threshold);
+      const Eigen::Vector2d by_times =
+          robust.derivative * Eigen::Vector2d(ByTime(view.bearings.a[i], r.by_a, r.by_J_a),
+                                              ByTime(view.bearings.b[i], r.by_b, r.by_J_b));
+      mixed += equations.RowOf(view, r, robust, i) * by_times.transpose();
+      information += by_times * by_times.transpose();
+      score += robust.value * by_times;
+    }
+    const Eigen::LDLT<PlaneEquations::Matrix8d> rest(equations.WithPrior());
+    information -= mixed.transpose() * rest.solve(mixed);
+    score -= mixed.transpose() * rest.solve(equations.g);
   }
-  const Eigen::LDLT<PlaneEquations::Matrix8d> rest(equations.WithPrior());
-  H -= mixed.transpose() * rest.solve(mixed);
-  g -= mixed.transpose() * rest.solve(equations.g);
-  return -H.ldlt().solve(g);
+
+  // A step of Gauss-Newton, with the prior of the times.
+  Eigen::Vector2d Step(const Eigen::Vector2d& offsets_s, double spread_s) const {
+    const double prior = 1.0 / (spread_s * spread_s);
+    const Eigen::Matrix2d H = information + prior * Eigen::Matrix2d::Identity();
+    return -H.ldlt().solve(score + prior * offsets_s);
+  }
+
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d score = Eigen::Vector2d::Zero();
+};
+
+Eigen::Vector2d OffsetsOf(const PairView& view) {
+  return {view.measurement.frame_a.offset_s, view.measurement.frame_b.offset_s};
 }
 
 // The plane of a pair's matches first, first + step, ..., at times of its frames' own.
@@ -178,11 +191,11 @@ class TimesOfPair {
     for (; width > 1.0; width *= 0.5) {
       for (int i = 0; i < kStepsAtWidth; ++i) {
         if (!At(offsets_s, width)) return false;
-        offsets_s += StepOfTimes(view, plane, width * spread_s_, first_, step_);
+        offsets_s += Step(offsets_s, width);
       }
     }
     for (int i = 0; At(offsets_s); ++i) {
-      const Eigen::Vector2d change = StepOfTimes(view, plane, spread_s_, first_, step_);
+      const Eigen::Vector2d change = Step(offsets_s, 1.0);
       if (i == kMostSteps || !(change.norm() > kConvergedS)) return true;
       offsets_s += change;
     }
@@ -214,11 +227,7 @@ class TimesOfPair {
   // [sigmas^2]
   double Cost(double width = 1.0) const {
     return PlaneEquations(view, plane, first_, step_).cost +
-           OffsetsS().squaredNorm() / std::pow(width * spread_s_, 2);
-  }
-
-  Eigen::Vector2d OffsetsS() const {
-    return {view.measurement.frame_a.offset_s, view.measurement.frame_b.offset_s};
+           OffsetsOf(view).squaredNorm() / std::pow(width * spread_s_, 2);
   }
 
   double RightShare() const {
@@ -234,6 +243,10 @@ class TimesOfPair {
   PairPlane plane;
 
  private:
+  Eigen::Vector2d Step(const Eigen::Vector2d& offsets_s, double width) const {
+    return TimesEquations(view, plane, first_, step_).Step(offsets_s, width * spread_s_);
+  }
+
   const EstimationInput& input_;
   const TimedPair& pair_;
   const Calibration& calibration_;
@@ -357,13 +370,27 @@ bool FitPair(const EstimationInput& input, const TimedPair& pair, const Calibrat
     const TimedPair few = WithFewMatches(pair, first, step);
     TimesOfPair coarse(input, few, calibration, noise_px, options, 0, 1);
     TimesOfPair other = fit;
-    if (coarse.Search() && other.DescendFrom(coarse.OffsetsS()) && other.Cost() < fit.Cost()) {
+    if (coarse.Search() && other.DescendFrom(OffsetsOf(coarse.view)) && other.Cost() < fit.Cost()) {
       fit.view = std::move(other.view);
       fit.plane = other.plane;
     }
   }
   *view = std::move(fit.view);
   *plane = fit.plane;
+  return true;
+}
+
+bool TimesOfPairAlone(const EstimationInput& input, const TimedPair& pair,
+                      const Calibration& calibration, double noise_px,
+                      const PairGraphOptions& options, PairTimes* times) {
+  PairView view;
+  PairPlane plane;
+  if (!FitPair(input, pair, calibration, noise_px, options, &view, &plane)) return false;
+  const TimesEquations equations(view, plane, 0, 1);
+  times->frame_a = PairGraph::FrameNumber(pair.time_a_s);
+  times->frame_b = PairGraph::FrameNumber(pair.time_b_s);
+  times->information = equations.information;
+  times->score = equations.score - equations.information * OffsetsOf(view);
   return true;
 }
 

@@ -136,14 +136,14 @@ class Refinement {
       }
       // A fit that has settled has done so, and it takes long.
       if (options_.latents == nullptr || options_.latents->planes.empty()) {
-        graph_->SearchFrameTimes();
+        graph_->SearchFrameTimes(TimesAlone());
       }
       const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
       const bool spread_settled =
           UpdateFrameTimes(options_.settled_scale, graph_.get(), &result_.frame_times);
-      const auto residuals = AllResiduals(/*search=*/false);
+      const auto residuals = graph_->AllResiduals(/*search=*/false);
       const Noise next = NextNoise(residuals);
       result_.calibration = graph_->Estimate();
       std::optional<double> moved;
@@ -232,15 +232,14 @@ class Refinement {
   // directions depend on it.
   void FindFirstScale() {
     const Noise searched_at = noise_now_;  // as the pairs were added
-    SetScale(noise_.Next(AllResiduals(/*search=*/false), noise_now_.scale));
+    SetScale(noise_.Next(graph_->AllResiduals(/*search=*/false), noise_now_.scale));
     const bool same = SameNoise(searched_at);
     scale_settled_ = same && options_.latents != nullptr;
     if (facts_.of_attitudes || same) return;
-    SetScale(noise_.Next(AllResiduals(/*search=*/true), noise_now_.scale));
+    SetScale(noise_.Next(graph_->AllResiduals(/*search=*/true), noise_now_.scale));
   }
 
-  // Of a pair: scale * factor.
-  struct Noise {
+  struct Noise {  // of a pair: scale * factor
     double scale = 1.0;
     std::vector<double> factors;  // as ids_
   };
@@ -313,8 +312,12 @@ class Refinement {
     return graph_->Solve(options);
   }
 
-  std::vector<std::vector<double>> AllResiduals(bool search) {
-    return graph_->AllResiduals(search);
+  PairGraph::TimesAlone TimesAlone() const {
+    return [this, now = graph_->Estimate()](int64_t id, PairTimes* times) {
+      const auto pair = std::find_if(pairs_.begin(), pairs_.end(),
+                                     [id](const TimedPair& p) { return p.id == id; });
+      return TimesOfPairAlone(input_, *pair, now, noise_now_.scale, graph_options_, times);
+    };
   }
 
   // By how much another direction has to fit a pair better [sigmas^2].
@@ -343,8 +346,7 @@ class Refinement {
     }
     FitSum sum(graph_options_, facts_.per_match, facts_.lost_per_pair);
     for (size_t i = 0; i < residuals.size(); ++i) sum.Add(residuals[i], noise_now_.factors[i]);
-    FitQuality& q = result_.quality;
-    q = FitQuality();
+    FitQuality& q = result_.quality = FitQuality();
     q.pairs = graph_->num_pairs();
     q.noise_px = noise_now_.scale;
     double scatter_sq = 0.0;
