@@ -204,9 +204,9 @@ class TimesOfPair {
 
   // Over the times that are likely, with noise so large that none of their right matches is beyond
   // the loss in between, and down from the best. Frames that are very late would not be heard else:
-  // a direction across the rotation fits two thirds of what a wrong time does to the matches.
+  // a direction across the rotation fits most of what a wrong time does to the matches.
   bool Search() {
-    constexpr double kApart = 1.25;  // [spreads]
+    constexpr double kApart = 1.25;  // [spreads]; two of them to either side (FitPair's test)
     if (!At(Eigen::Vector2d::Zero())) return false;
     const double rate = view.rates.colwise().norm().maxCoeff();
     const double width =

@@ -136,7 +136,7 @@ class Refinement {
       }
       // A fit that has settled has done so, and it takes long.
       if (options_.latents == nullptr || options_.latents->planes.empty()) {
-        graph_->SearchFrameTimes(TimesAlone());
+        graph_->SearchFrameTimes(options_.frame_times_alone ? TimesAlone() : nullptr);
       }
       const SolveReport report = Solve();
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
