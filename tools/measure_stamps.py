@@ -80,8 +80,8 @@ def latencies_of(recording):
 
 
 def frames_in_sigmas(out, recording, shift_s, delay_sigma_s):
-    """Rms of the errors of the frames' own times [s], and their mean square in sigmas, with that of
-    the delay, which all frames share."""
+    """Rms of the errors of the frames' own times [s], their mean square in sigmas, with that of the
+    delay, which all frames share, and the largest in sigmas beside their median."""
     if not os.path.exists(out + "/frame_times.csv"):
         return None
     found = np.loadtxt(out + "/frame_times.csv", delimiter=",", dtype=np.int64, ndmin=2)
@@ -90,7 +90,8 @@ def frames_in_sigmas(out, recording, shift_s, delay_sigma_s):
     first_row = {stamp: time for time, stamp in truth}
     error = np.array([(row[1] - first_row[row[0]]) * 1e-9 for row in found]) + shift_s
     return [float(np.sqrt(np.mean(error**2))),
-            float(np.mean(error**2 / ((1e-9 * found[:, 2])**2 + delay_sigma_s**2)))]
+            float(np.mean(error**2 / ((1e-9 * found[:, 2])**2 + delay_sigma_s**2))),
+            float(np.max(np.abs(error - np.median(error)) / (1e-9 * found[:, 2])))]
 
 
 def run(options, case):
@@ -167,12 +168,13 @@ def row_of(label, rows):
         of("delay_s", 4, 1e3), of("delay_here_s", 4, 1e3),
         "%.2f" % rms([r["z"][4] for r in good if r["known"][4]] or [np.nan]),
         of("readout_s", 3, 1e3), of("focal", 0, 100), nees.mean(), spread,
-        "%.2f, %.2f" % (1e3 * rms([f[0] for f in frames]), np.mean([f[1] for f in frames]))
+        "%.2f, %.2f, %.1f" % (1e3 * rms([f[0] for f in frames]), np.mean([f[1] for f in frames]),
+                              np.max([f[2] for f in frames]))
         if frames else "-", found(good, "gyro"), found(good, "camera"))
 
 
 HEAD = ("| %s | recordings | t_d [ms] | t_d here [ms] | t_d in sigmas | t_r [ms] | f [%%] | NEES/dof "
-        "| frames' times [ms], chi2 | gyro's stamps | frames' stamps |\n" + "| --- " * 11 + "|")
+        "| frames' times [ms], chi2, furthest | gyro's stamps | frames' stamps |\n" + "| --- " * 11 + "|")
 
 
 def print_tables(rows):

@@ -131,7 +131,7 @@ class PairGraph {
   // frame that is late by so much that most of its matches look wrong pulls no solve to its time,
   // since the loss is bounded. Sets what is better. Does nothing where frames have no times of
   // their own. alone: what a pair tells by itself (TimesOfPairAlone), if it is known; it is asked
-  // by several threads.
+  // by several threads. With it, the pairs are of frames that follow each other, in their order.
   using TimesAlone = std::function<bool(int64_t id, PairTimes* times)>;
   void SearchFrameTimes(const TimesAlone& alone = {});
   // Their spread, for the solves to come and for Estimate: of an effect's parameter, which no
@@ -211,9 +211,10 @@ class PairGraph {
   // What SearchFrameTimes makes small: bounded residuals with the priors of all that is the pair's
   // own. residuals: of the pair.
   double CostOfTimes(int64_t id, const Pair& pair, const std::vector<double>& residuals) const;
-  // Sets all frames' times to those that are most likely by what pairs with enough right matches
-  // tell where they are, and the others tell alone, if that is better. A chain of pairs that a very
-  // late frame has put under tension is as it should be only when all of them move.
+  // Sets frames' times to those that are most likely by what pairs with enough right matches tell
+  // where they are, and the others tell alone, where that is better for the pairs together. A chain
+  // of pairs that a very late frame has put under tension is as it should be only when all of them
+  // move. The pairs are chains of frames that follow each other.
   void TakeTimesOfPairsAlone(const std::vector<double>& shares, double right_share,
                              const TimesAlone& alone);
   // Of a pair that has fewer right matches than `right_share`; touched: the pairs that have one of

@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "core/linear_algebra.h"
 #include "core/parallel.h"
@@ -19,6 +20,43 @@
 #include "factors/robust.h"
 
 namespace camgyro {
+namespace {
+
+// Of a pair that has lost its rays, which no choice is made for.
+constexpr double kNoResiduals = 1e12;
+
+// What a pair costs for either time of its first and of its second frame.
+struct PairCosts {
+  std::array<std::array<double, 2>, 2> of{};
+  bool follows = false;  // its first frame is the second one of the pair before
+};
+
+// Which of the two times each pair's frames take so that all cost least together; the first where
+// both cost the same. (Dynamic programming along the chain.)
+std::vector<std::array<size_t, 2>> LeastOfChain(const std::vector<PairCosts>& pairs) {
+  using Two = std::array<double, 2>;
+  const auto least = [](const Two& costs) { return static_cast<size_t>(costs[1] < costs[0]); };
+  std::vector<Two> sums(pairs.size());                     // up to each pair, by its second frame
+  std::vector<std::array<size_t, 2>> first(pairs.size());  // the best of its first frame, likewise
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    Two before{};
+    if (pairs[i].follows) before = sums[i - 1];
+    for (size_t b = 0; b < 2; ++b) {
+      const Two ways = {before[0] + pairs[i].of[0].at(b), before[1] + pairs[i].of[1].at(b)};
+      first[i].at(b) = least(ways);
+      sums[i].at(b) = ways.at(first[i].at(b));
+    }
+  }
+  std::vector<std::array<size_t, 2>> chosen(pairs.size());
+  for (size_t i = pairs.size(); i-- > 0;) {
+    const bool followed = i + 1 < pairs.size() && pairs[i + 1].follows;
+    const size_t second = followed ? chosen[i + 1][0] : least(sums[i]);
+    chosen[i] = {first[i].at(second), second};
+  }
+  return chosen;
+}
+
+}  // namespace
 
 int64_t PairGraph::FrameNumber(double stamp_s) { return std::llround(1e9 * stamp_s); }
 
@@ -206,28 +244,62 @@ void PairGraph::TakeTimesOfPairsAlone(const std::vector<double>& shares, double 
   for (const auto& times : found) {
     if (times) all.push_back(*times);
   }
-  std::map<BlockId, Eigen::VectorXd> before;
-  for (const auto& [id, pair] : pairs_) {
-    for (const BlockId& block : {DirectionBlock(id), BendBlock(id)}) {
-      before[block] = graph_.value(block);
-    }
-    for (const int64_t frame : pair.frame_times) {
-      before[FrameTimeBlock(frame)] = graph_.value(FrameTimeBlock(frame));
-    }
-  }
-  const auto cost = [&] {
-    const std::vector<std::vector<double>> residuals = AllResiduals(/*search=*/true);
-    double sum = 0.0;
-    size_t i = 0;
-    for (const auto& [id, pair] : pairs_) sum += CostOfTimes(id, pair, residuals[i++]);
-    return sum;
+  struct Choice {
+    std::array<double, 2> times_s;  // as it was; the likely one
+    bool odd = false;               // along its chain
   };
-  const double cost_before = cost();
-  for (const FrameOffset& frame : OffsetsOf(all, *frame_time_spread_s_)) {
-    graph_.value(FrameTimeBlock(frame.frame))[0] = frame.offset_s;
+  std::map<int64_t, Choice> frames;
+  for (const auto& [id, pair] : pairs_) {
+    for (const int64_t frame : pair.frame_times) {
+      const double now_s = graph_.value(FrameTimeBlock(frame))[0];
+      frames.emplace(frame, Choice{{now_s, now_s}, false});
+    }
+    frames.at(pair.frame_times[1]).odd = !frames.at(pair.frame_times[0]).odd;
   }
-  if (cost() < cost_before) return;
-  for (const auto& [block, value] : before) graph_.value(block) = value;
+  for (const FrameOffset& frame : OffsetsOf(all, *frame_time_spread_s_)) {
+    frames.at(frame.frame).times_s[1] = frame.offset_s;
+  }
+
+  // Every pair with either time of both of its frames.
+  struct Fitted {
+    Eigen::VectorXd direction, bend;
+  };
+  std::vector<std::array<std::array<Fitted, 2>, 2>> fitted(pairs_.size());
+  std::vector<PairCosts> costs(pairs_.size());
+  for (const auto& [even, odd] : {std::pair<size_t, size_t>(0, 0), {1, 1}, {0, 1}, {1, 0}}) {
+    for (const auto& [number, frame] : frames) {
+      graph_.value(FrameTimeBlock(number))[0] = frame.times_s.at(frame.odd ? odd : even);
+    }
+    const std::vector<std::vector<double>> residuals = AllResiduals(/*search=*/true);
+    size_t i = 0;
+    for (const auto& [id, pair] : pairs_) {
+      const bool first_odd = frames.at(pair.frame_times[0]).odd;
+      const size_t a = first_odd ? odd : even, b = first_odd ? even : odd;
+      fitted[i].at(a).at(b) = {graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+      costs[i].of.at(a).at(b) =
+          residuals[i].empty() ? kNoResiduals : CostOfTimes(id, pair, residuals[i]);
+      ++i;
+    }
+  }
+  size_t i = 0;
+  int64_t last = 0;
+  for (const auto& [id, pair] : pairs_) {
+    costs[i].follows = i > 0 && pair.frame_times[0] == last;
+    last = pair.frame_times[1];
+    ++i;
+  }
+  const std::vector<std::array<size_t, 2>> chosen = LeastOfChain(costs);
+  i = 0;
+  for (const auto& [id, pair] : pairs_) {
+    const Fitted& own = fitted[i].at(chosen[i][0]).at(chosen[i][1]);
+    graph_.value(DirectionBlock(id)) = own.direction;
+    graph_.value(BendBlock(id)) = own.bend;
+    for (size_t k = 0; k < 2; ++k) {
+      graph_.value(FrameTimeBlock(pair.frame_times[k]))[0] =
+          frames.at(pair.frame_times[k]).times_s.at(chosen[i].at(k));
+    }
+    ++i;
+  }
 }
 
 void PairGraph::SearchFrameTimes(const TimesAlone& alone) {
