@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/so3.h"
+#include "core/sphere.h"
 
 namespace camgyro {
 namespace {
@@ -47,9 +48,7 @@ Eigen::Vector3d RefineTranslation(const std::vector<CoplanarityNormal>& normals,
                                   Eigen::Vector3d tau) {
   double cost = TruncatedCost(normals, tau, max_sq);
   for (int iteration = 0; iteration < 5; ++iteration) {
-    Eigen::Matrix<double, 3, 2> tangent;
-    tangent.col(0) = tau.unitOrthogonal();
-    tangent.col(1) = tau.cross(tangent.col(0));
+    const Eigen::Matrix<double, 3, 2> tangent = TangentsOf(tau);
     Eigen::Matrix2d hessian = Eigen::Matrix2d::Zero();
     Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
     for (const CoplanarityNormal& normal : normals) {

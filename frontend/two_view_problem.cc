@@ -8,18 +8,9 @@
 
 #include "core/robust_statistics.h"
 #include "core/so3.h"
+#include "core/sphere.h"
 
 namespace camgyro {
-namespace {
-
-Eigen::Matrix<double, 3, 2> TangentOf(const Eigen::Vector3d& unit) {
-  Eigen::Matrix<double, 3, 2> tangent;
-  tangent.col(0) = unit.unitOrthogonal();
-  tangent.col(1) = unit.cross(tangent.col(0));
-  return tangent;
-}
-
-}  // namespace
 
 double SpreadOf(std::vector<double> squared, int num_parameters) {
   const auto n = static_cast<double>(squared.size());
@@ -123,7 +114,7 @@ TwoViewProblem::Linearised TwoViewProblem::Linearise(const TwoViewMotion& motion
   Linearised out;
   out.hessian.setZero();
   out.gradient.setZero();
-  out.tangent = TangentOf(motion.tau);
+  out.tangent = TangentsOf(motion.tau);
   for (size_t i = 0; i < matches_.size(); ++i) {
     const Residual one = LineariseOne(i, motion, out.tangent);
     const double weight = loss.Weight(one.Squared());
@@ -140,7 +131,7 @@ RotationFit TwoViewProblem::FitWithCovariance(const TwoViewMotion& motion,
                                               const RobustLoss& loss) const {
   RotationFit fit;
   fit.R_a_b = motion.R_a_b;
-  const Eigen::Matrix<double, 3, 2> tangent = TangentOf(motion.tau);
+  const Eigen::Matrix<double, 3, 2> tangent = TangentsOf(motion.tau);
   Eigen::Matrix<double, 5, 5> information = Eigen::Matrix<double, 5, 5>::Zero();
   Eigen::Matrix2d noise = Eigen::Matrix2d::Zero();
   double sum_psi_sq = 0.0, sum_slope = 0.0, count = 0.0;

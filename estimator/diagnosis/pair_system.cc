@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/sphere.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
 #include "factors/rotation_manifold.h"
@@ -147,9 +148,7 @@ void FillOwn(const PairResidual& residual, const LinearPair& linear, const Timed
   s->prior.setZero(s->N.cols());
   s->at.setZero(s->N.cols());
   if (of_direction > 0) {
-    const Eigen::Vector3d u = linear.plane.tau.unitOrthogonal(), v = linear.plane.tau.cross(u);
-    s->N.col(0) = linear.J(BlockKind::kDirection) * u;
-    s->N.col(1) = linear.J(BlockKind::kDirection) * v;
+    s->N.leftCols<2>() = linear.J(BlockKind::kDirection) * TangentsOf(linear.plane.tau);
     s->N.middleCols<6>(2) = linear.J(BlockKind::kBend);
     s->prior.segment<6>(2) = linear.view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
     s->at.segment<6>(2) = linear.plane.bend;

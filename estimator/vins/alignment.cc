@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/linear_algebra.h"
+#include "core/sphere.h"
 
 namespace camgyro {
 namespace {
@@ -103,9 +104,7 @@ Result<VinsAlignment> AlignWithInertial(const VinsWindow& window, const VinsStru
   alignment.free_gravity_m_s2 = solution.gravity.norm();
   Vector3d gravity = gravity_m_s2 * solution.gravity.normalized();
   for (int round = 0; round < kSphereRounds; ++round) {
-    Eigen::Matrix3Xd tangent(3, 2);
-    tangent.col(0) = gravity.unitOrthogonal();
-    tangent.col(1) = gravity.normalized().cross(tangent.col(0));
+    const Eigen::Matrix3Xd tangent = TangentsOf(gravity.normalized());
     solution = linear.Solve(gravity, gravity_m_s2 * tangent);
     gravity =
         gravity_m_s2 * (gravity / gravity_m_s2 + tangent * solution.gravity.head<2>()).normalized();

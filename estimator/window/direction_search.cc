@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/sphere.h"
 #include "factors/robust.h"
 
 namespace camgyro {
@@ -153,9 +154,8 @@ Refined Refine(const std::vector<TwoMatches>& matches, double threshold, Vector3
   double cost = Cost(matches, threshold, tau);
   double damping = 1e-3;
   for (int iteration = 0; iteration < 8; ++iteration) {
-    const Vector3d u = tau.unitOrthogonal(), v = tau.cross(u);
-    Eigen::Matrix<double, 3, 2> basis;
-    basis << u, v;
+    const Eigen::Matrix<double, 3, 2> basis = TangentsOf(tau);
+    const Vector3d u = basis.col(0), v = basis.col(1);
     Eigen::Matrix2d H = Eigen::Matrix2d::Zero();
     Eigen::Vector2d g = Eigen::Vector2d::Zero();
     const std::array<TwoMatches::Two, 3> x = AtBoth(tau);

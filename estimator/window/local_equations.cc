@@ -5,19 +5,13 @@
 #include <vector>
 
 #include "core/linear_algebra.h"
+#include "core/sphere.h"
 #include "estimator/window/kept_cost.h"
 
 namespace camgyro {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-Eigen::Matrix<double, 3, 2> TangentsOf(const Eigen::Vector3d& direction) {
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = direction.unitOrthogonal();
-  basis.col(1) = direction.cross(basis.col(0));
-  return basis;
-}
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/sphere.h"
 #include "estimator/window/direction_search.h"
 #include "estimator/window/pair_graph.h"
 #include "factors/robust.h"
@@ -84,10 +85,9 @@ struct PlaneEquations {
   using Matrix8d = Eigen::Matrix<double, 8, 8>;
   using Vector8d = Eigen::Matrix<double, 8, 1>;
 
-  PlaneEquations(const PairView& view, const PairPlane& plane, size_t first, size_t step) {
+  PlaneEquations(const PairView& view, const PairPlane& plane, size_t first, size_t step)
+      : basis(TangentsOf(plane.tau)) {
     const PairMeasurement& m = view.measurement;
-    basis.col(0) = plane.tau.unitOrthogonal();
-    basis.col(1) = plane.tau.cross(basis.col(0));
     prior.tail<6>() = view.bend_sigma_rad.cwiseAbs2().cwiseInverse();
     g.tail<6>() = prior.tail<6>().cwiseProduct(plane.bend);
     cost = plane.bend.dot(g.tail<6>());

@@ -8,6 +8,7 @@
 #include "core/linear_algebra.h"
 #include "core/pair_model.h"
 #include "core/rotation_chain.h"
+#include "core/sphere.h"
 #include "core/time.h"
 
 namespace camgyro::comparison {
@@ -110,7 +111,7 @@ class Accumulator {
     const Eigen::Index size = information_.rows();
     Eigen::Matrix3Xd by_rates(3, chain.size());
     for (const Vector3d& tau : directions) {
-      const Vector3d t1 = tau.unitOrthogonal(), t2 = tau.cross(t1);
+      const Eigen::Matrix<double, 3, 2> tangents = TangentsOf(tau);
       MatrixXd sum = MatrixXd::Zero(size, size), cross = MatrixXd::Zero(size, 2);
       Eigen::Matrix2d of_tau = Eigen::Matrix2d::Zero();
       for (const RayPair& r : rays) {
@@ -128,7 +129,7 @@ class Accumulator {
             Eigen::Map<VectorXd>(by_rates.data(), by_rates.size());
         const double inv_sigma = 1.0 / std::sqrt(Variance(r, tau, variance_a, variance_b));
         J *= inv_sigma;
-        const Eigen::RowVector2d J_tau = inv_sigma * Eigen::RowVector2d(t1.dot(r.n), t2.dot(r.n));
+        const Eigen::RowVector2d J_tau = inv_sigma * r.n.transpose() * tangents;
         sum.noalias() += J * J.transpose();
         cross.noalias() += J * J_tau;
         of_tau += J_tau.transpose() * J_tau;
