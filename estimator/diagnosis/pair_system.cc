@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/sphere.h"
+#include "estimator/window/fit_pair.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
 #include "factors/rotation_manifold.h"

@@ -7,7 +7,6 @@
 
 #include "core/calibration.h"
 #include "estimator/window/estimation_input.h"
-#include "estimator/window/frame_times.h"
 #include "estimator/window/pair_graph_options.h"
 #include "factors/coplanarity_plane.h"
 #include "factors/pair_bearings.h"
@@ -45,18 +44,6 @@ struct PairPlane {
 // The plane that fits the matches first, first + step, ... of a view best: the direction searched,
 // its bend with the prior.
 PairPlane FitPlane(const PairView& view, size_t first = 0, size_t step = 1);
-// ViewPair and FitPlane; where frames have times of their own (frame_stamp_jitter), at those that
-// the same matches tell: measurement.frame_a and frame_b of the view have the offsets. False also
-// for fewer than PairGraph::kMinMatches.
-[[nodiscard]] bool FitPair(const EstimationInput& input, const TimedPair& pair,
-                           const Calibration& calibration, double noise_px,
-                           const PairGraphOptions& options, PairView* view, PairPlane* plane,
-                           size_t first = 0, size_t step = 1);
-// What a pair's own matches say of the times of its frames (frame_stamp_jitter), at those that
-// FitPair finds, the gyro taken for exact. False where FitPair is.
-[[nodiscard]] bool TimesOfPairAlone(const EstimationInput& input, const TimedPair& pair,
-                                    const Calibration& calibration, double noise_px,
-                                    const PairGraphOptions& options, PairTimes* times);
 // That a plane takes from these matches: 2 of a direction with a bend that its prior determines, at
 // most 6, since what of the bend lies along the direction changes nothing.
 double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t first = 0,

@@ -9,6 +9,7 @@
 
 #include "core/free_memory.h"
 #include "core/parallel.h"
+#include "estimator/window/fit_pair.h"
 #include "estimator/window/noise_scale.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/yardstick.h"

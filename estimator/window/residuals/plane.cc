@@ -1,6 +1,7 @@
 // All matches of a pair against one plane, whose normal is an unknown of the pair.
 #include <cmath>
 
+#include "estimator/window/fit_pair.h"
 #include "estimator/window/pair_graph_options.h"
 #include "estimator/window/pair_view.h"
 #include "estimator/window/residuals/all_residuals.h"

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "core/time.h"
+#include "estimator/window/fit_pair.h"
 #include "estimator/window/pair_graph.h"
 #include "tests/estimator/simulated_input.h"
 

@@ -1,4 +1,4 @@
-#include "estimator/window/pair_view.h"
+#include "estimator/window/fit_pair.h"
 
 #include <gmock/gmock.h>
 
