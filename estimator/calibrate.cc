@@ -314,6 +314,9 @@ class CalibrationJob {
             ? TimesOfAllFrames(recording_, refined->calibration, refined->frame_times,
                                refined->quality.noise_px, refinement.graph)
             : refined->frame_times;
+    if (!refined->late_frames.empty()) {
+      report_.notes.push_back(Describe(refined->late_frames, refined->frame_times));
+    }
     if (refined->frame_wander.slow_s > 0.0) {
       report_.notes.push_back(Describe(refined->frame_wander));
     }

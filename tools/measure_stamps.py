@@ -169,7 +169,7 @@ def row_of(label, rows):
         "%.2f" % rms([r["z"][4] for r in good if r["known"][4]] or [np.nan]),
         of("readout_s", 3, 1e3), of("focal", 0, 100), nees.mean(), spread,
         "%.2f, %.2f, %.1f" % (1e3 * rms([f[0] for f in frames]), np.mean([f[1] for f in frames]),
-                              np.max([f[2] for f in frames]))
+                              max([f[2] for f in frames if len(f) > 2], default=np.nan))
         if frames else "-", found(good, "gyro"), found(good, "camera"))
 
 

@@ -30,6 +30,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import yaml
+from scipy.stats import sigmaclip
 
 from calibration_errors import NAMES, errors
 
@@ -38,8 +39,10 @@ SHOWN = ("f", "t_r", "t_d")
 
 
 def mean_lateness_s(before_ns, after_ns):
-    """What late stamps are of the delay by definition: it is that of the mean stamp."""
-    return 1e-9 * float(np.mean(np.array(after_ns) - np.array(before_ns)))
+    """What late stamps are of the delay by definition: it is that of the mean stamp, but for frames
+    that are later by more than five standard deviations of the others."""
+    late_s = 1e-9 * (np.array(after_ns) - np.array(before_ns))
+    return float(np.mean(sigmaclip(late_s, 5.0, 5.0).clipped))
 
 
 class Recorded:

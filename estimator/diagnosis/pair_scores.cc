@@ -20,7 +20,7 @@ namespace {
 // its own matches tell; here these are the stamps, for all pairs alike.
 struct PairAlone {
   std::array<int, 2> frames = {0, 0};
-  double frame_time_prior = 0.0;  // 1 / s^2
+  Eigen::Vector2d frame_time_prior = Eigen::Vector2d::Zero();  // 1 / s^2, of either frame
   double chi2 = 0.0;
   Eigen::VectorXd g;
   Eigen::MatrixXd H;
@@ -58,7 +58,7 @@ PairAlone ProjectOwnOut(const PairSystem& s, const TimedPair& pair) {
     const auto T = s.N.middleCols<2>(first);
     const Eigen::MatrixXd NT = N.transpose() * T;
     p.frames = {pair.frame_a, pair.frame_b};
-    p.frame_time_prior = s.prior[first];
+    p.frame_time_prior = s.prior.segment<2>(first);
     p.times_g = T.transpose() * s.r - NT.transpose() * x;
     p.times_H = T.transpose() * T - NT.transpose() * solver.Solve(NT);
     p.times_by_columns = T.transpose() * s.J - NT.transpose() * X;
@@ -95,8 +95,8 @@ class TimesOfBlock {
         const Eigen::Index row = rows_[frame];
         const double part = 1.0 / uses[frame];  // of the prior, which each frame has once
         b[row] += p.times_g[i];
-        D(row, row) += part * p.frame_time_prior;
-        log_det_ -= part * std::log(p.frame_time_prior);
+        D(row, row) += part * p.frame_time_prior[i];
+        log_det_ -= part * std::log(p.frame_time_prior[i]);
         by_columns.row(row) += p.times_by_columns.row(i);
         for (Eigen::Index j = 0; j < 2; ++j) {
           D(row, rows_[p.frames.at(static_cast<size_t>(j))]) += p.times_H(i, j);

@@ -157,7 +157,9 @@ void FillOwn(const PairResidual& residual, const LinearPair& linear, const Timed
   if (with_times) {
     s->times_column = static_cast<int>(of_direction);
     s->N.middleCols<2>(of_direction) = s->by_times;
-    s->prior.segment<2>(of_direction).setConstant(std::pow(all.frame_time_spread_s, -2.0));
+    s->prior.segment<2>(of_direction)
+        << std::pow(PriorSpread(m.frame_a.offset_s, all.frame_time_spread_s), -2.0),
+        std::pow(PriorSpread(m.frame_b.offset_s, all.frame_time_spread_s), -2.0);
     s->at.segment<2>(of_direction) << m.frame_a.offset_s, m.frame_b.offset_s;
   }
   for (Eigen::Index k = 0; k < values; ++k) {

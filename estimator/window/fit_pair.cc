@@ -36,11 +36,12 @@ struct TimesEquations {
     score -= mixed.transpose() * rest.solve(equations.g);
   }
 
-  // A step of Gauss-Newton, with the prior of the times.
-  Eigen::Vector2d Step(const Eigen::Vector2d& offsets_s, double spread_s) const {
-    const double prior = 1.0 / (spread_s * spread_s);
-    const Eigen::Matrix2d H = information + prior * Eigen::Matrix2d::Identity();
-    return -H.ldlt().solve(score + prior * offsets_s);
+  // A step of Gauss-Newton, with the prior of the times: standard deviations.
+  Eigen::Vector2d Step(const Eigen::Vector2d& offsets_s, const Eigen::Vector2d& prior_s) const {
+    const Eigen::Vector2d prior = prior_s.cwiseAbs2().cwiseInverse();
+    Eigen::Matrix2d H = information;
+    H.diagonal() += prior;
+    return -H.ldlt().solve(score + prior.cwiseProduct(offsets_s));
   }
 
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
@@ -99,14 +100,15 @@ class TimesOfPair {
   bool Search() {
     constexpr double kApart = 1.25;  // [spreads]; two of them to either side (FitPair's test)
     if (!At(Eigen::Vector2d::Zero())) return false;
+    const double searched_s = std::max(spread_s_, kSearchedSpreadS);
     const double rate = view.rates.colwise().norm().maxCoeff();
     const double width =
-        std::max(1.0, kApart * spread_s_ * rate * calibration_.lens[kFocal] / noise_px_);
+        std::max(1.0, kApart * searched_s * rate * calibration_.lens[kFocal] / noise_px_);
     double least = std::numeric_limits<double>::infinity();
     Eigen::Vector2d best = Eigen::Vector2d::Zero();
     for (int a = -2; a <= 2; ++a) {
       for (int b = -2; b <= 2; ++b) {
-        const Eigen::Vector2d offsets_s = kApart * spread_s_ * Eigen::Vector2d(a, b);
+        const Eigen::Vector2d offsets_s = kApart * searched_s * Eigen::Vector2d(a, b);
         if (!At(offsets_s, width) || !(Cost(width) < least)) continue;
         least = Cost(width);
         best = offsets_s;
@@ -117,8 +119,10 @@ class TimesOfPair {
 
   // [sigmas^2]
   double Cost(double width = 1.0) const {
+    const Eigen::Vector2d offsets_s = OffsetsOf(view);
     return PlaneEquations(view, plane, first_, step_).cost +
-           OffsetsOf(view).squaredNorm() / std::pow(width * spread_s_, 2);
+           (PriorCost(offsets_s[0], spread_s_) + PriorCost(offsets_s[1], spread_s_)) /
+               (width * width);
   }
 
   double RightShare() const {
@@ -135,7 +139,9 @@ class TimesOfPair {
 
  private:
   Eigen::Vector2d Step(const Eigen::Vector2d& offsets_s, double width) const {
-    return TimesEquations(view, plane, first_, step_).Step(offsets_s, width * spread_s_);
+    const Eigen::Vector2d prior_s(PriorSpread(offsets_s[0], spread_s_),
+                                  PriorSpread(offsets_s[1], spread_s_));
+    return TimesEquations(view, plane, first_, step_).Step(offsets_s, width * prior_s);
   }
 
   const EstimationInput& input_;

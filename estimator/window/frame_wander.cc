@@ -27,7 +27,7 @@ constexpr double kLeastOfWhite = 1e-3;  // where a part of the offsets counts as
 // with T of a Gauss-Markov process with variance 1, which couples neighbours only.
 class WanderSystem {
  public:
-  explicit WanderSystem(const std::vector<PairTimes>& pairs) {
+  explicit WanderSystem(const std::vector<PairTimes>& pairs, const LateFrames& late = {}) {
     std::map<int64_t, Eigen::Index> at;
     for (const PairTimes& pair : pairs) {
       for (const int64_t frame : {pair.frame_a, pair.frame_b}) at.emplace(frame, 0);
@@ -36,6 +36,7 @@ class WanderSystem {
       entry.second = static_cast<Eigen::Index>(times_s_.size());
       numbers_.push_back(entry.first);
       times_s_.push_back(1e-9 * static_cast<double>(entry.first));
+      is_late_.push_back(late.count(entry.first) > 0);
     }
     score_.setZero(frames());
     for (const PairTimes& pair : pairs) {
@@ -75,7 +76,7 @@ class WanderSystem {
     std::vector<FrameOffset> offsets;
     Eigen::VectorXd of_frame = Eigen::VectorXd::Zero(2 * n);
     for (Eigen::Index i = 0; i < n; ++i) {
-      of_frame[i] = wander.white_s;
+      of_frame[i] = WhiteOf(wander, i);
       of_frame[n + i] = wander.slow_s;
       offsets.push_back({numbers_[static_cast<size_t>(i)], of_frame.dot(parts),
                          std::sqrt(of_frame.dot(solver_.solve(of_frame)))});
@@ -85,22 +86,29 @@ class WanderSystem {
   }
 
  private:
-  static Eigen::VectorXd Both(const FrameWander& wander, const Eigen::VectorXd& v) {
+  // Standard deviation of a frame's white part; a late one's is anything.
+  double WhiteOf(const FrameWander& wander, Eigen::Index i) const {
+    return is_late_[static_cast<size_t>(i)] ? kMostSpreadS : wander.white_s;
+  }
+
+  Eigen::VectorXd Both(const FrameWander& wander, const Eigen::VectorXd& v) const {
     Eigen::VectorXd both(2 * v.size());
-    both << wander.white_s * v, wander.slow_s * v;
+    both << v, wander.slow_s * v;
+    for (Eigen::Index i = 0; i < v.size(); ++i) both[i] *= WhiteOf(wander, i);
     return both;
   }
 
   void Factorise(const FrameWander& wander) {
     const Eigen::Index n = frames();
-    const double w = wander.white_s, s = wander.slow_s;
+    const double s = wander.slow_s;
     std::vector<Eigen::Triplet<double>> entries;
     entries.reserve(4 * information_.size() + static_cast<size_t>(5 * n));
     for (const auto& entry : information_) {
       const Eigen::Index i = entry.row(), k = entry.col();
-      entries.emplace_back(i, k, w * w * entry.value());
-      entries.emplace_back(i, n + k, w * s * entry.value());
-      entries.emplace_back(n + i, k, w * s * entry.value());
+      const double white_i = WhiteOf(wander, i), white_k = WhiteOf(wander, k);
+      entries.emplace_back(i, k, white_i * white_k * entry.value());
+      entries.emplace_back(i, n + k, white_i * s * entry.value());
+      entries.emplace_back(n + i, k, s * white_k * entry.value());
       entries.emplace_back(n + i, n + k, s * s * entry.value());
     }
     for (Eigen::Index i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
@@ -125,6 +133,7 @@ class WanderSystem {
 
   std::vector<int64_t> numbers_;  // of frames
   std::vector<double> times_s_;
+  std::vector<bool> is_late_;
   Eigen::VectorXd score_;
   std::vector<Eigen::Triplet<double>> information_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
@@ -160,11 +169,12 @@ double TwoLogLikelihood(const std::vector<PairTimes>& pairs, const FrameWander& 
   return WanderSystem(pairs).TwoLogLikelihood(wander);
 }
 
-FrameWander MostLikelyWander(const std::vector<PairTimes>& pairs, double white_s) {
+FrameWander MostLikelyWander(const std::vector<PairTimes>& pairs, double white_s,
+                             const LateFrames& late) {
   FrameWander white;
   white.white_s = white_s;
   if (pairs.empty() || !(white_s > kLeastSpreadS)) return white;
-  WanderSystem system(pairs);
+  WanderSystem system(pairs, late);
   const double none = system.TwoLogLikelihood(white);
   FrameWander best = white;
   const double part_s = white_s / std::sqrt(2.0);
@@ -179,12 +189,14 @@ FrameWander MostLikelyWander(const std::vector<PairTimes>& pairs, double white_s
   return best.two_log_likelihood > kSignificant ? best : white;
 }
 
-std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const FrameWander& wander) {
-  return WanderSystem(pairs).Offsets(wander);
+std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const FrameWander& wander,
+                                   const LateFrames& late) {
+  return WanderSystem(pairs, late).Offsets(wander);
 }
 
-double VarianceOfShift(const std::vector<PairTimes>& pairs, const FrameWander& wander) {
-  return 1.0 / WanderSystem(pairs).InformationOfShift(wander);
+double VarianceOfShift(const std::vector<PairTimes>& pairs, const FrameWander& wander,
+                       const LateFrames& late) {
+  return 1.0 / WanderSystem(pairs, late).InformationOfShift(wander);
 }
 
 std::string Describe(const FrameWander& wander) {

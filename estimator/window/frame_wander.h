@@ -26,15 +26,19 @@ double TwoLogLikelihood(const std::vector<PairTimes>& pairs, const FrameWander& 
 
 // The most likely wander; none (slow_s and time_s are 0) where it is not more likely than white
 // offsets by what chance gives to its two parameters in one case of a hundred.
-// white_s: MostLikelySpread.
-FrameWander MostLikelyWander(const std::vector<PairTimes>& pairs, double white_s);
+// white_s: the most likely spread of frames that are not late. Here and below, late frames wander
+// as the others do, and their white part is kMostSpreadS.
+FrameWander MostLikelyWander(const std::vector<PairTimes>& pairs, double white_s,
+                             const LateFrames& late = {});
 
 // Mean and standard deviation of each frame's offset given the wander, in the order of frames:
 // where the matches say little of a frame, it is near its neighbours, not near zero.
-std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const FrameWander& wander);
+std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, const FrameWander& wander,
+                                   const LateFrames& late = {});
 
 // Variance of a shift that all frames share, if nothing but their offsets hides it [s^2].
-double VarianceOfShift(const std::vector<PairTimes>& pairs, const FrameWander& wander);
+double VarianceOfShift(const std::vector<PairTimes>& pairs, const FrameWander& wander,
+                       const LateFrames& late = {});
 
 // What a wander is, in a sentence.
 std::string Describe(const FrameWander& wander);

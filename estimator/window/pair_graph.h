@@ -134,10 +134,18 @@ class PairGraph {
   // by several threads. With it, the pairs are of frames that follow each other, in their order.
   using TimesAlone = std::function<bool(int64_t id, PairTimes* times)>;
   void SearchFrameTimes(const TimesAlone& alone = {});
-  // Their spread, for the solves to come and for Estimate: of an effect's parameter, which no
-  // residual depends on.
-  void SetFrameTimeSpread(const Spread& spread);
+  // Their law, for the solves to come and for Estimate, where the spread is an effect's parameter,
+  // which no residual depends on.
+  void SetFrameTimeLaw(const FrameTimeLaw& law);
+  FrameTimeLaw frame_time_law() const {
+    return {{*frame_time_spread_s_, frame_time_spread_sigma_s_}, late_frames_};
+  }
   double frame_time_spread_s() const { return *frame_time_spread_s_; }
+  const LateFrames& late_frames() const { return late_frames_; }
+  // Sets the most likely law of the times that the frames have now; offsets: the times by it. True
+  // if the spread has settled: within a share, as the scale of the noise, or so small that no match
+  // shows it. Where frames have no times of their own it has, and nothing is set.
+  bool UpdateFrameTimes(double settled, std::vector<FrameOffset>* offsets);
   // What frames' own times may share, beyond what their spread allows for: it is in the covariance
   // of the delay from now on [s^2].
   void SetSharedFrameTime(double variance_s2) { shared_frame_time_s2_ = variance_s2; }
@@ -198,6 +206,7 @@ class PairGraph {
   // Drops the matches without a residual: a pair is solved as a whole. False if too few are left.
   [[nodiscard]] bool KeepMatches(const RateGroups::Cover& cover, PairMeasurement* pair) const;
   void AddDirection(int64_t id, Pair* pair);
+  void SetLateFrames(LateFrames late);
   // The frames' own times, if they have any.
   void AddFrameTimes(const TimedPair& timed, Pair* pair);
   // The blocks of a pair's factor.
@@ -245,6 +254,8 @@ class PairGraph {
   std::shared_ptr<double> frame_time_spread_s_;
   double frame_time_spread_sigma_s_ = 0.0, shared_frame_time_s2_ = 0.0;
   std::map<int64_t, FactorGraph::FactorKey> frame_time_priors_;  // by frame
+  const std::shared_ptr<double> late_spread_s_ = std::make_shared<double>(kMostSpreadS);
+  LateFrames late_frames_;  // those whose prior has late_spread_s_
   // By pair, the share of right matches when SearchFrameTimes found nothing better.
   std::map<int64_t, double> searched_in_vain_;
   std::map<int64_t, Pair> pairs_;

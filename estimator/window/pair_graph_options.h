@@ -41,6 +41,9 @@ struct PairGraphOptions {
   // Samples kept on both sides of a pair, so that delay and readout can move in a solve. Beyond,
   // rates are held.
   double rate_margin_s = 0.004;
+  // Rates are kept for frames that are late by as much, where frames have times of their own,
+  // whatever their spread is [s].
+  double late_margin_s = 0.0;
   // Noise of the gyro is estimated as its mean over so long, or less where what that neglects, a
   // random walk of the angle within the step, would turn the picture by more than so many pixels
   // (rms).

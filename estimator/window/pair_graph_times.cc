@@ -19,7 +19,9 @@ int64_t PairGraph::FrameNumber(double stamp_s) { return std::llround(1e9 * stamp
 double PairGraph::RateMargin() const {
   // A time of its own is rarely off by more: of exponential latencies, one in a thousand.
   constexpr double kSpreads = 6.0;
-  return options_.rate_margin_s + (has_frame_times() ? kSpreads * *frame_time_spread_s_ : 0.0);
+  if (!has_frame_times()) return options_.rate_margin_s;
+  return options_.rate_margin_s +
+         std::max(kSpreads * *frame_time_spread_s_, options_.late_margin_s);
 }
 
 void PairGraph::AddFrameTimes(const TimedPair& timed, Pair* pair) {
@@ -34,8 +36,11 @@ void PairGraph::AddFrameTimes(const TimedPair& timed, Pair* pair) {
       }
       graph_.AddBlock(FrameTimeBlock(number),
                       {Geometry::kEuclidean, Eigen::VectorXd::Constant(1, own_time_s), {}});
+      const bool late = IsLate(own_time_s, *frame_time_spread_s_);
+      if (late) late_frames_.insert(number);
       frame_time_priors_[number] = graph_.AddFactor(
-          std::make_shared<FrameTimePrior>(frame_time_spread_s_), {FrameTimeBlock(number)});
+          std::make_shared<FrameTimePrior>(late ? late_spread_s_ : frame_time_spread_s_),
+          {FrameTimeBlock(number)});
     }
     pair->frame_times.push_back(number);
   }
@@ -90,9 +95,34 @@ std::vector<PairTimes> PairGraph::FrameTimes(double inflation) const {
   return all;
 }
 
-void PairGraph::SetFrameTimeSpread(const Spread& spread) {
+void PairGraph::SetLateFrames(LateFrames late) {
+  for (auto& [frame, prior] : frame_time_priors_) {
+    const bool is_late = late.count(frame) > 0;
+    if (is_late == (late_frames_.count(frame) > 0)) continue;
+    graph_.RemoveFactor(prior);
+    prior = graph_.AddFactor(
+        std::make_shared<FrameTimePrior>(is_late ? late_spread_s_ : frame_time_spread_s_),
+        {FrameTimeBlock(frame)});
+  }
+  late_frames_ = std::move(late);
+}
+
+bool PairGraph::UpdateFrameTimes(double settled, std::vector<FrameOffset>* offsets) {
+  if (!has_frame_times()) return true;
+  constexpr double kNothingS = 1e-5;
+  const std::vector<PairTimes> times = FrameTimes();
+  const FrameTimeLaw law = MostLikelyLaw(times);
+  const double before_s = *frame_time_spread_s_;
+  *offsets = OffsetsOf(times, law);
+  SetFrameTimeLaw(law);
+  return std::abs(law.spread.value_s - before_s) < std::max(kNothingS, settled * before_s);
+}
+
+void PairGraph::SetFrameTimeLaw(const FrameTimeLaw& law) {
   CHECK(has_frame_times());
+  const Spread& spread = law.spread;
   CHECK_GT(spread.value_s, 0.0);
+  SetLateFrames(law.late);
   *frame_time_spread_s_ = spread.value_s;
   frame_time_spread_sigma_s_ = spread.sigma_s;
   graph_.value(kEffectsBlock)[effects_->frame_time_spread()] = spread.value_s;

@@ -62,7 +62,7 @@ double PairGraph::CostOfTimes(int64_t id, const Pair& pair,
   }
   cost += graph_.value(BendBlock(id)).cwiseQuotient(pair.bend_sigma_rad).squaredNorm();
   for (const int64_t frame : pair.frame_times) {
-    cost += std::pow(graph_.value(FrameTimeBlock(frame))[0] / *frame_time_spread_s_, 2);
+    cost += PriorCost(graph_.value(FrameTimeBlock(frame))[0], *frame_time_spread_s_);
   }
   return cost;
 }
@@ -84,13 +84,14 @@ void PairGraph::DescendWithoutLoss(int64_t id, Pair* pair, PairBearings* bearing
     SetSigma(id, width * sigma);
     // The direction, of these times.
     if (width == kWidest) Residuals(id, /*search=*/true, 0.0, bearings);
-    const double information = std::pow(width * *frame_time_spread_s_, -2);
     for (int step = 0; step < kSteps; ++step) {
       equations.Begin();
       equations.AddAfresh(graph_, graph_.factors().at(pair->factor));
       equations.Add(graph_, graph_.factors().at(pair->bend_prior));
       for (const int64_t frame : pair->frame_times) {
         const double offset_s = graph_.value(FrameTimeBlock(frame))[0];
+        const double information =
+            std::pow(width * PriorSpread(offset_s, *frame_time_spread_s_), -2);
         equations.AddTo(FrameTimeBlock(frame), information, information * offset_s);
       }
       equations.Step(&graph_);
@@ -114,6 +115,7 @@ bool PairGraph::SearchFrameTimesOf(int64_t id, const std::vector<int64_t>& touch
   constexpr double kBetter = 1.0;
   // Where descents begin, in spreads from where the times are now.
   constexpr std::array<double, 3> kStarts = {0.0, -2.5, 2.5};
+  const double spread_s = std::max(*frame_time_spread_s_, kSearchedSpreadS);
   PairBearings bearings;
   if (RightShare(id, &bearings) >= right_share) return true;
   Pair& pair = pairs_.at(id);
@@ -146,8 +148,8 @@ bool PairGraph::SearchFrameTimesOf(int64_t id, const std::vector<int64_t>& touch
   bool right = false, found = false;
   for (size_t k = 0; k < kStarts.size() * kStarts.size() && !right; ++k) {
     set(before);
-    graph_.value(own[0])[0] += kStarts.at(k % kStarts.size()) * *frame_time_spread_s_;
-    graph_.value(own[1])[0] += kStarts.at(k / kStarts.size()) * *frame_time_spread_s_;
+    graph_.value(own[0])[0] += kStarts.at(k % kStarts.size()) * spread_s;
+    graph_.value(own[1])[0] += kStarts.at(k / kStarts.size()) * spread_s;
     DescendWithoutLoss(id, &pair, &bearings);
     const double here = cost();
     if (!(here < least)) continue;
@@ -187,7 +189,9 @@ void PairGraph::TakeTimesOfPairsAlone(const std::vector<double>& shares, double 
     }
     frames.at(pair.frame_times[1]).odd = !frames.at(pair.frame_times[0]).odd;
   }
-  for (const FrameOffset& frame : OffsetsOf(all, *frame_time_spread_s_)) {
+  // Which frames are late is chosen with all of them.
+  const FrameTimeLaw law = MostLikelyLaw(all);
+  for (const FrameOffset& frame : OffsetsOf(all, *frame_time_spread_s_, law.late)) {
     frames.at(frame.frame).times_s[1] = frame.offset_s;
   }
 
@@ -214,6 +218,7 @@ void PairGraph::TakeTimesOfPairsAlone(const std::vector<double>& shares, double 
   }
   size_t i = 0;
   int64_t last = 0;
+  LateFrames late;
   for (const auto& [id, pair] : pairs_) {
     costs[i].follows = i > 0 && pair.frame_times[0] == last;
     last = pair.frame_times[1];
@@ -226,11 +231,13 @@ void PairGraph::TakeTimesOfPairsAlone(const std::vector<double>& shares, double 
     graph_.value(DirectionBlock(id)) = own.direction;
     graph_.value(BendBlock(id)) = own.bend;
     for (size_t k = 0; k < 2; ++k) {
-      graph_.value(FrameTimeBlock(pair.frame_times[k]))[0] =
-          frames.at(pair.frame_times[k]).times_s.at(chosen[i].at(k));
+      const int64_t frame = pair.frame_times[k];
+      graph_.value(FrameTimeBlock(frame))[0] = frames.at(frame).times_s.at(chosen[i].at(k));
+      if ((chosen[i].at(k) == 1 ? law.late : late_frames_).count(frame) > 0) late.insert(frame);
     }
     ++i;
   }
+  SetLateFrames(std::move(late));
 }
 
 void PairGraph::SearchFrameTimes(const TimesAlone& alone) {
@@ -288,14 +295,26 @@ void PairGraph::SearchFrameTimes(const TimesAlone& alone) {
     if (turn == turns.size()) turns.emplace_back();
     turns[turn].push_back({id, share, {touched.begin(), touched.end()}});
   }
+  LateFrames late = late_frames_;
   for (std::vector<Search>& turn : turns) {
     ParallelFor(turn.size(), [&](size_t k) {
       turn[k].found = SearchFrameTimesOf(turn[k].id, turn[k].touched, right_share);
     });
     for (const Search& search : turn) {
-      if (!search.found) searched_in_vain_[search.id] = search.share;
+      if (!search.found) {
+        searched_in_vain_[search.id] = search.share;
+        continue;
+      }
+      for (const int64_t frame : pairs_.at(search.id).frame_times) {
+        if (IsLate(graph_.value(FrameTimeBlock(frame))[0], *frame_time_spread_s_)) {
+          late.insert(frame);
+        } else {
+          late.erase(frame);
+        }
+      }
     }
   }
+  SetLateFrames(std::move(late));
 }
 
 }  // namespace camgyro

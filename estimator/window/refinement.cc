@@ -45,28 +45,16 @@ double TurnOfScan(const TimedPair& pair, const Calibration& a, const Calibration
   return (shares(a) - shares(b)).cwiseAbs().maxCoeff();
 }
 
-// The spread of the frames' own times, if they have any, for the next solve. True if it has
-// settled: within a share, as the scale of the noise, or so small that no match shows it.
-bool UpdateFrameTimes(double settled, PairGraph* graph, std::vector<FrameOffset>* offsets) {
-  if (!graph->has_frame_times()) return true;
-  constexpr double kNothingS = 1e-5;
-  const std::vector<PairTimes> times = graph->FrameTimes();
-  const Spread spread = MostLikelySpread(times);
-  const double before_s = graph->frame_time_spread_s();
-  *offsets = OffsetsOf(times, spread);
-  graph->SetFrameTimeSpread(spread);
-  return std::abs(spread.value_s - before_s) < std::max(kNothingS, settled * before_s);
-}
-
 // How far the frames' own times wander together, for the covariance of the delay.
 FrameWander FindWander(const std::vector<PairTimes>& times, PairGraph* graph) {
-  const double spread_s = graph->frame_time_spread_s();
+  const LateFrames& late = graph->late_frames();
   FrameWander white;
-  white.white_s = spread_s;
-  const FrameWander wander = MostLikelyWander(times, spread_s);
-  graph->SetSharedFrameTime(wander.slow_s > 0.0 ? std::max(0.0, VarianceOfShift(times, wander) -
-                                                                    VarianceOfShift(times, white))
-                                                : 0.0);
+  white.white_s = graph->frame_time_spread_s();
+  const FrameWander wander = MostLikelyWander(times, white.white_s, late);
+  graph->SetSharedFrameTime(wander.slow_s > 0.0
+                                ? std::max(0.0, VarianceOfShift(times, wander, late) -
+                                                    VarianceOfShift(times, white, late))
+                                : 0.0);
   return wander;
 }
 
@@ -78,6 +66,9 @@ constexpr double kCostTolerance = 0.005;
 constexpr double kRoughly = 1e-4;
 
 constexpr int kLeastPairs = 10;
+
+// A frame that is later than this is not found [s]: the next one has come by then.
+constexpr double kLatestS = 0.03;
 
 // The first solve has a scale of the noise that is the misfit of the start; the second one shows
 // where a fit goes.
@@ -119,6 +110,7 @@ class Refinement {
         noise_(facts_, input, pairs, options.graph.gyro_sigma_rad_s) {
     if (!pairs.empty()) graph_options_.residual = &ResidualOf(pairs.front(), options.graph);
     noise_now_.scale = graph_options_.first_sigma();
+    graph_options_.late_margin_s = kLatestS;
     result_.calibration = start;
   }
 
@@ -143,7 +135,7 @@ class Refinement {
       if (!report.usable) return CannotEstimate("the solver failed: " + report.message);
 
       const bool spread_settled =
-          UpdateFrameTimes(options_.settled_scale, graph_.get(), &result_.frame_times);
+          graph_->UpdateFrameTimes(options_.settled_scale, &result_.frame_times);
       const auto residuals = graph_->AllResiduals(/*search=*/false);
       const Noise next = NextNoise(residuals);
       result_.calibration = graph_->Estimate();
@@ -334,7 +326,10 @@ class Refinement {
     if (graph_->has_frame_times()) {
       const std::vector<PairTimes> times = graph_->FrameTimes(cross_fit.inflation());
       result_.frame_wander = FindWander(times, graph_.get());
-      result_.frame_times = OffsetsOf(times, result_.frame_wander);
+      result_.late_frames = graph_->late_frames();
+      result_.frame_times = result_.frame_wander.slow_s > 0.0
+                                ? OffsetsOf(times, result_.frame_wander, result_.late_frames)
+                                : OffsetsOf(times, graph_->frame_time_law());
     }
     if (options_.frame_times_alone) {
       result_.converged = true;

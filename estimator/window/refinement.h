@@ -62,7 +62,8 @@ struct Refined {
   int skipped_pairs = 0;  // gyro gaps, too few matches, outside the gyro's time
   // With frame_stamp_jitter: of every frame that is in a pair, by PairGraph::FrameNumber.
   std::vector<FrameOffset> frame_times;
-  FrameWander frame_wander;  // of these
+  LateFrames late_frames;    // among these
+  FrameWander frame_wander;  // of the others
   std::shared_ptr<const PairLatents> latents;
   std::map<int64_t, double> noise_factors;  // TimedPair::noise_factor of the pairs used, by id
 };

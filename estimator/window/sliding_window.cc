@@ -235,12 +235,12 @@ void SlidingWindow::UpdateFrameTimes() {
   // A window in which the camera rests says nothing of it.
   constexpr double kWithinNoise = 1.0;
   if (TwoLogLikelihood(times, here.value_s) - TwoLogLikelihood(times, before_s) < kWithinNoise) {
-    graph_.SetFrameTimeSpread({before_s, here.sigma_s});
+    graph_.SetFrameTimeLaw({{before_s, here.sigma_s}, {}});
     return;
   }
   const double change = std::clamp(std::log(here.value_s / before_s), -1.0, 1.0);
   const double share = settled_ ? 0.1 : 1.0;  // as of the noise
-  graph_.SetFrameTimeSpread({before_s * std::exp(share * change), here.sigma_s});
+  graph_.SetFrameTimeLaw({{before_s * std::exp(share * change), here.sigma_s}, {}});
 }
 
 bool SlidingWindow::Settled(const Calibration& estimate) const {

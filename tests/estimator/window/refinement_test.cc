@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
 
+#include "core/time.h"
 #include "estimator/window/pair_graph.h"
 #include "tests/estimator/simulated_input.h"
 
@@ -173,6 +176,44 @@ TEST(Refinement, GoesOnFromAnotherFit) {
   EXPECT_GT(anew->rounds, 1);
   const StateVector moved = Difference(again->calibration, fit->calibration);
   EXPECT_LT(moved.cwiseQuotient(fit->calibration.sigma()).cwiseAbs().maxCoeff(), 0.3);
+}
+
+// One frame in 25 is late by 10 to 25 ms, and all others are on time to the microsecond: those that
+// are late are found, with their times, and the others' times are known for what they are.
+TEST(Refinement, FindsFramesThatAreLateNowAndThen) {
+  Simulated s = SimulateTracks(ShortScenario(8.0)).value();
+  const EstimationInput clean_input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  const Prior prior = StartOffTheTruth(s.truth);
+  const Result<Refined> clean = Refine(clean_input, clean_input.pairs, prior.mean, prior, {});
+  ASSERT_TRUE(clean.has_value()) << clean.error().message;
+
+  std::map<int64_t, double> late_s;  // by PairGraph::FrameNumber
+  for (size_t i = 10; i < s.recording.frames.size(); i += 25) {
+    const double by_s = 1e-3 * static_cast<double>(10 + 7 * i % 16);
+    s.recording.frames[i].stamp_ns += static_cast<int64_t>(1e9 * by_s);
+    late_s[PairGraph::FrameNumber(
+        SecondsSince(clean_input.origin_ns, s.recording.frames[i].stamp_ns))] = by_s;
+  }
+  const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  Calibration start = prior.mean;
+  start.effects = std::make_shared<const EffectSet>(
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+  start.effect_values = Eigen::VectorXd::Zero(1);
+  const Result<Refined> refined = Refine(input, input.pairs, start, prior, {});
+  ASSERT_TRUE(refined.has_value()) << refined.error().message;
+  EXPECT_LT(ErrorInSigmas(refined->calibration, s.truth).cwiseAbs().maxCoeff(), 4.0);
+  EXPECT_LT(refined->calibration.effect_values[0], 0.4e-3);  // 3 ms with those that are late
+  const StateVector wider = refined->calibration.sigma().cwiseQuotient(clean->calibration.sigma());
+  EXPECT_LT(wider.maxCoeff(), 1.5);
+  size_t late = 0;
+  for (const FrameOffset& frame : refined->frame_times) {
+    const auto by = late_s.find(frame.frame);
+    const bool is_late = by != late_s.end();
+    late += is_late ? 1 : 0;
+    EXPECT_EQ(refined->late_frames.count(frame.frame) > 0, is_late) << frame.frame;
+    EXPECT_NEAR(frame.offset_s, is_late ? -by->second : 0.0, 5.0 * frame.sigma_s) << frame.frame;
+  }
+  EXPECT_GE(late, 6U);
 }
 
 // Frames that are later than the rates around their pairs reach: the fit is made anew with more.
