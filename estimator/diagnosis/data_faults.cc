@@ -16,7 +16,8 @@
 namespace camgyro {
 namespace {
 
-// Gaps longer than 1.5 intervals: how many, how many steps are missing, where the longest is.
+// Gaps longer than 1.5 intervals that are not made up for by the items after them, which have only
+// come late: how many, how many steps are missing, where the longest is.
 struct Gaps {
   int count = 0, missing = 0;
   double longest_s = 0.0, longest_at_s = 0.0;
@@ -25,13 +26,22 @@ struct Gaps {
 // known(i): the gap before item i is one of our making.
 template <typename Stamped, typename Known>
 Gaps FindGaps(const std::vector<Stamped>& items, int64_t origin_ns, const Known& known) {
+  constexpr double kShort = 0.95;  // [intervals] between an item that was late and the next
   Gaps gaps;
   const double interval = MedianInterval(items);
   for (size_t i = 1; i < items.size(); ++i) {
     const double step = SecondsSince(items[i - 1].stamp_ns, items[i].stamp_ns);
     if (step < 1.5 * interval || known(i)) continue;
+    double made_up = 0.0;
+    for (size_t k = i + 1; k < items.size(); ++k) {
+      const double next = SecondsSince(items[k - 1].stamp_ns, items[k].stamp_ns);
+      if (next > kShort * interval) break;
+      made_up += interval - next;
+    }
+    const auto missing = static_cast<int>(std::lround((step - made_up) / interval)) - 1;
+    if (missing <= 0) continue;
     ++gaps.count;
-    gaps.missing += static_cast<int>(std::lround(step / interval)) - 1;
+    gaps.missing += missing;
     if (step > gaps.longest_s) {
       gaps.longest_s = step;
       gaps.longest_at_s = SecondsSince(origin_ns, items[i - 1].stamp_ns);

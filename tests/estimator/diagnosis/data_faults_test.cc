@@ -74,6 +74,24 @@ TEST(DataFaults, DroppedFramesAndSamples) {
   EXPECT_THAT(faults[1].finding, HasSubstr("105 ms"));
 }
 
+// A frame that comes late leaves a gap before it, and none in what was recorded; nor do frames that
+// wait for it and come close after it. Where one is missing beside, the gap is longer.
+TEST(DataFaults, LateFramesAreNoGaps) {
+  Recording recording = Simulate({}).recording;
+  recording.frames[50].stamp_ns += 28000000;
+  for (const size_t i : {80U, 81U}) {
+    recording.frames[i].stamp_ns =
+        recording.frames[82].stamp_ns - 1000000 * (90 - static_cast<int64_t>(i));
+  }
+  EXPECT_THAT(FindDataFaults(recording), testing::IsEmpty());
+  recording.frames.erase(recording.frames.begin() + 49);
+  recording.tracks.erase(recording.tracks.begin() + 49);
+  const auto faults = FindDataFaults(recording);
+  ASSERT_THAT(Names(faults), testing::ElementsAre("dropped_frames"));
+  EXPECT_THAT(faults[0].finding,
+              HasSubstr("1 gaps in the frames' stamps (about 1 frames missing)"));
+}
+
 // Every fifth picture is shown twice, with the stamp of the one that is missing.
 TEST(DataFaults, RepeatedPicturesAreLeftOut) {
   const Recording sound = Simulate({"motion.kind=running"}).recording;
