@@ -22,7 +22,7 @@ struct System {
     for (auto& entry : at) entry.second = next++;
     score.setZero(next);
     is_late.resize(static_cast<size_t>(next));
-    for (const int64_t frame : late) is_late[static_cast<size_t>(at.at(frame))] = true;
+    for (const auto& [frame, row] : at) is_late[static_cast<size_t>(row)] = late.count(frame) > 0;
     std::vector<Eigen::Triplet<double>> entries;
     for (const PairTimes& pair : pairs) {
       const int index[2] = {at.at(pair.frame_a), at.at(pair.frame_b)};
