@@ -17,8 +17,10 @@ that were calibrated and whose focal length, readout time and delay are all dete
 determined parameters within 3 sigma_total, their rms errors in sigma_total and in sigmas of noise,
 the medians of the errors' size of f, t_r and t_d, the recordings with a doubt, and the time of a
 calibration. Below the table: errors beyond 3 sigma_total, refusals, effects that
-the program fitted of its own accord, and doubts, one line each, and what frames that a fit has not
-seen leave over those that it has (quality: unseen_ratio).
+the program fitted of its own accord, and doubts, one line each, what frames that a fit has not seen
+leave over those that it has (quality: unseen_ratio), and how far the frames' own times
+(frame_times.csv) are off, about their median, of frames that are late by more than 2 ms and of the
+others: rms in ms and in sigmas.
 """
 import argparse
 import contextlib
@@ -36,6 +38,7 @@ from calibration_errors import NAMES, errors
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SHOWN = ("f", "t_r", "t_d")
+LATE_NS = 2000000
 
 
 def mean_lateness_s(before_ns, after_ns):
@@ -215,6 +218,27 @@ def judgement(diagnosis):
     return lines
 
 
+def errors_of_times(out, before_ns, after_ns):
+    """Of frames' own times: whether the fault has made them late, errors [s], and these in sigmas."""
+    if not os.path.exists(out + "/frame_times.csv"):
+        return None
+    found = np.loadtxt(out + "/frame_times.csv", delimiter=",", dtype=np.int64, ndmin=2)
+    index = {stamp: i for i, stamp in enumerate(after_ns)}
+    of = [index[row[0]] for row in found]
+    truth = np.array(before_ns)[of]
+    lateness = np.array(after_ns)[of] - truth
+    error = 1e-9 * (found[:, 1] - truth)
+    error -= np.median(error)
+    return lateness - np.median(lateness) > LATE_NS, error, error / (1e-9 * found[:, 2])
+
+
+def describe_times(results):
+    late, error, z = (np.concatenate(part) for part in zip(*results))
+    return ", ".join("%d %s %.2f ms, %.2f sigmas" % (
+        np.sum(some), name, 1e3 * np.sqrt(np.mean(error[some]**2)), np.sqrt(np.mean(z[some]**2)))
+        for some, name in ((late, "late frames"), (~late, "others")) if np.any(some))
+
+
 def folder_of(options, name):
     if not options.keep:
         return tempfile.TemporaryDirectory()
@@ -258,6 +282,8 @@ def run(options, fault, seed):
         result["fitted"] = ["%s:%s" % (e["name"], e["shape"]) for e in calibration.get("effects", [])]
         if options.diagnose:
             result["says"] += judgement(read(out + "/diagnosis.yaml"))
+        if FAULTS[fault] and len(stamps_ns) == len(recorded.stamps_ns):
+            result["times"] = errors_of_times(out, stamps_ns, recorded.stamps_ns)
         error, noise = errors(calibration, truth)
         unknown = calibration["quality"]["unobservable"]
         used = np.array([name not in unknown for name in calibration["covariance"]["order"]])
@@ -289,6 +315,9 @@ def print_row(fault, results):
     if ratios:
         notes.append("%s: unseen frames leave %.2f to %.2f times what seen ones do" % (
             fault, min(ratios), max(ratios)))
+    times = [r["times"] for r in found if r.get("times")]
+    if times:
+        notes.append("%s: frames' own times: %s" % (fault, describe_times(times)))
     for r in found:
         off = [pair for pair in zip(NAMES, r["z"]) if abs(pair[1]) > 3]
         if off:
