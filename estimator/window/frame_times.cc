@@ -155,10 +155,11 @@ Spread MostLikelySpread(const std::vector<PairTimes>& pairs, const LateFrames& l
 }
 
 FrameTimeLaw MostLikelyLaw(const std::vector<PairTimes>& pairs) {
-  FrameTimeLaw law;
+  const Spread of_all = MostLikelySpread(pairs);
+  FrameTimeLaw law{of_all, {}};
   LateFrames cleared;
   for (;;) {
-    law.spread = MostLikelySpread(pairs, law.late);
+    if (!law.late.empty()) law.spread = MostLikelySpread(pairs, law.late);
     bool found = false;
     // The late frame that is the least so, if it is not by what the others tell: a frame that is
     // drawn along by a late one that it makes a pair with looks late before that one does.
@@ -178,10 +179,11 @@ FrameTimeLaw MostLikelyLaw(const std::vector<PairTimes>& pairs) {
       }
     }
     if (found) continue;
-    if (least == kLateSpreads) return law;
+    if (least == kLateSpreads) break;
     law.late.erase(innocent);
     cleared.insert(innocent);
   }
+  return law.spread.value_s < kSpreadOfOthers * of_all.value_s ? law : FrameTimeLaw{of_all, {}};
 }
 
 std::vector<FrameOffset> OffsetsOf(const std::vector<PairTimes>& pairs, double spread_s,

@@ -32,8 +32,8 @@ constexpr double kLeastSpreadS = 1e-6, kMostSpreadS = 0.1;
 // Frames whose times do not follow the law of the others, as of a logger that is held up now and
 // then; by their numbers. They are known to kMostSpreadS before any match has been looked at.
 using LateFrames = std::set<int64_t>;
-// So many spreads off, a frame is one of them: of Gaussian times one in 1.7 million, of exponential
-// latencies one in 400.
+// So many spreads off, a frame may be one of them: of Gaussian times one in 1.7 million is, of
+// exponential latencies one in 400.
 constexpr double kLateSpreads = 5.0;
 inline bool IsLate(double offset_s, double spread_s) {
   return std::abs(offset_s) > kLateSpreads * spread_s;
@@ -66,7 +66,10 @@ struct FrameTimeLaw {
   LateFrames late;
 };
 // Frames become late, and the spread of the others less, until no other frame is late by the spread
-// and by how well the pairs know it.
+// and by how well the pairs know it. If the others then have kSpreadOfOthers of the spread of all,
+// or more, none is late: the latest of exponential latencies are a part of their law, and the mean
+// of the others, which the delay is, would be another.
+constexpr double kSpreadOfOthers = 0.5;
 FrameTimeLaw MostLikelyLaw(const std::vector<PairTimes>& pairs);
 
 struct FrameOffset {

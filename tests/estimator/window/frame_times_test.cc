@@ -136,6 +136,13 @@ TEST(FrameTimes, LateFramesAreNoneOfTheLaw) {
       EXPECT_NEAR(found.offset_s, offsets[found.frame], 5.0 * found.sigma_s) << seed;
     }
   }
+  for (uint64_t seed = 0; seed < 10; ++seed) {  // latencies with a tail, but of one law
+    std::mt19937_64 random(seed);
+    std::exponential_distribution<double> latency(1.0 / kSpreadS);
+    Eigen::VectorXd offsets(500);
+    for (double& offset : offsets) offset = kSpreadS - latency(random);
+    EXPECT_EQ(MostLikelyLaw(MeasurePairs(offsets, 0.1e-3, &random)).late.size(), 0U) << seed;
+  }
   EXPECT_THAT(Describe({3}, {{1, 1e-3, 0.0}, {3, -0.02, 0.0}}),
               testing::HasSubstr("1 of 2 frames are later, or earlier, than the spread of the "
                                  "others allows, by up to 20 ms"));
