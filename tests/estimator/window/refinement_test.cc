@@ -25,6 +25,14 @@ Result<Refined> RefineFromOffTheTruth(const Simulated& s, const EstimationInput&
   return Refine(input, input.pairs, start.mean, start, {});
 }
 
+// Where a fit begins in which frames have times of their own.
+Calibration WithFrameTimes(const Simulated& s, Calibration start) {
+  start.effects = std::make_shared<const EffectSet>(
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
+  start.effect_values = Eigen::VectorXd::Zero(1);
+  return start;
+}
+
 // A scenario of which this share of the matches is wrong: both observations must be right.
 Simulated WithWrongMatches(Scenario scenario, double share) {
   scenario.tracks.outlier_fraction = 1.0 - std::sqrt(1.0 - share);
@@ -103,10 +111,7 @@ TEST(Refinement, FramesHaveTimesOfTheirOwn) {
   const Prior prior = StartOffTheTruth(s.truth);
   const Result<Refined> without = Refine(input, input.pairs, prior.mean, prior, {});
   ASSERT_TRUE(without.has_value()) << without.error().message;
-  Calibration start = prior.mean;
-  start.effects = std::make_shared<const EffectSet>(
-      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
-  start.effect_values = Eigen::VectorXd::Zero(1);
+  const Calibration start = WithFrameTimes(s, prior.mean);
   const Result<Refined> refined = Refine(input, input.pairs, start, prior, {});
   ASSERT_TRUE(refined.has_value()) << refined.error().message;
   const Calibration& c = refined->calibration;
@@ -154,10 +159,7 @@ TEST(Refinement, GoesOnFromAnotherFit) {
   const Simulated s = SimulateTracks(scenario).value();
   const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
   const Prior prior = StartOffTheTruth(s.truth);
-  Calibration start = prior.mean;
-  start.effects = std::make_shared<const EffectSet>(
-      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
-  start.effect_values = Eigen::VectorXd::Zero(1);
+  const Calibration start = WithFrameTimes(s, prior.mean);
   const Result<Refined> fit = Refine(input, input.pairs, start, prior, {});
   ASSERT_TRUE(fit.has_value()) << fit.error().message;
   ASSERT_NE(fit->latents, nullptr);
@@ -195,14 +197,11 @@ TEST(Refinement, FindsFramesThatAreLateNowAndThen) {
         SecondsSince(clean_input.origin_ns, s.recording.frames[i].stamp_ns))] = by_s;
   }
   const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
-  Calibration start = prior.mean;
-  start.effects = std::make_shared<const EffectSet>(
-      MakeEffects("frame_stamp_jitter", MakeEffectSetup(s.recording, start)).value());
-  start.effect_values = Eigen::VectorXd::Zero(1);
+  const Calibration start = WithFrameTimes(s, prior.mean);
   const Result<Refined> refined = Refine(input, input.pairs, start, prior, {});
   ASSERT_TRUE(refined.has_value()) << refined.error().message;
   EXPECT_LT(ErrorInSigmas(refined->calibration, s.truth).cwiseAbs().maxCoeff(), 4.0);
-  EXPECT_LT(refined->calibration.effect_values[0], 0.4e-3);  // 3 ms with those that are late
+  EXPECT_LT(refined->calibration.effect_values[0], 0.4e-3);
   const StateVector wider = refined->calibration.sigma().cwiseQuotient(clean->calibration.sigma());
   EXPECT_LT(wider.maxCoeff(), 1.5);
   size_t late = 0;
