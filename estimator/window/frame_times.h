@@ -46,7 +46,7 @@ inline double PriorSpread(double offset_s, double spread_s) {
 inline double PriorCost(double offset_s, double spread_s) {
   return std::pow(std::min(std::abs(offset_s) / spread_s, kLateSpreads), 2);
 }
-// Late frames are searched as if times had at least this spread.
+// Late frames are searched as if times had at least this spread: from 20 ms to either side.
 constexpr double kSearchedSpreadS = 8e-3;
 
 // The standard deviation of independent Gaussian offsets with mean zero that makes what the pairs
