@@ -129,9 +129,10 @@ class PairGraph {
   static int64_t FrameNumber(double stamp_s);  // [ns]
   // Searches the times of frames where they may be caught in a minimum that is not the deepest: a
   // frame that is late by so much that most of its matches look wrong pulls no solve to its time,
-  // since the loss is bounded. Sets what is better. Does nothing where frames have no times of
-  // their own. alone: what a pair tells by itself (TimesOfPairAlone), if it is known; it is asked
-  // by several threads. With it, the pairs are of frames that follow each other, in their order.
+  // since the loss is bounded. Sets what is better, and then which frames are late. Does nothing
+  // where frames have no times of their own. alone: what a pair tells by itself (TimesOfPairAlone),
+  // if it is known; it is asked by several threads. With it, the pairs are of frames that follow
+  // each other, in their order.
   using TimesAlone = std::function<bool(int64_t id, PairTimes* times)>;
   void SearchFrameTimes(const TimesAlone& alone = {});
   // Their law, for the solves to come and for Estimate, where the spread is an effect's parameter,

@@ -218,7 +218,6 @@ void PairGraph::TakeTimesOfPairsAlone(const std::vector<double>& shares, double 
   }
   size_t i = 0;
   int64_t last = 0;
-  LateFrames late;
   for (const auto& [id, pair] : pairs_) {
     costs[i].follows = i > 0 && pair.frame_times[0] == last;
     last = pair.frame_times[1];
@@ -233,11 +232,9 @@ void PairGraph::TakeTimesOfPairsAlone(const std::vector<double>& shares, double 
     for (size_t k = 0; k < 2; ++k) {
       const int64_t frame = pair.frame_times[k];
       graph_.value(FrameTimeBlock(frame))[0] = frames.at(frame).times_s.at(chosen[i].at(k));
-      if ((chosen[i].at(k) == 1 ? law.late : late_frames_).count(frame) > 0) late.insert(frame);
     }
     ++i;
   }
-  SetLateFrames(std::move(late));
 }
 
 void PairGraph::SearchFrameTimes(const TimesAlone& alone) {
@@ -295,26 +292,16 @@ void PairGraph::SearchFrameTimes(const TimesAlone& alone) {
     if (turn == turns.size()) turns.emplace_back();
     turns[turn].push_back({id, share, {touched.begin(), touched.end()}});
   }
-  LateFrames late = late_frames_;
   for (std::vector<Search>& turn : turns) {
     ParallelFor(turn.size(), [&](size_t k) {
       turn[k].found = SearchFrameTimesOf(turn[k].id, turn[k].touched, right_share);
     });
     for (const Search& search : turn) {
-      if (!search.found) {
-        searched_in_vain_[search.id] = search.share;
-        continue;
-      }
-      for (const int64_t frame : pairs_.at(search.id).frame_times) {
-        if (IsLate(graph_.value(FrameTimeBlock(frame))[0], *frame_time_spread_s_)) {
-          late.insert(frame);
-        } else {
-          late.erase(frame);
-        }
-      }
+      if (!search.found) searched_in_vain_[search.id] = search.share;
     }
   }
-  SetLateFrames(std::move(late));
+  // What was found has moved frames: which of them are late is asked of all of them anew.
+  SetLateFrames(MostLikelyLaw(FrameTimes()).late);
 }
 
 }  // namespace camgyro
