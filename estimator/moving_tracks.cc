@@ -24,13 +24,31 @@ void AddLeans(const EstimationInput& input, const TimedPair& pair, const Calibra
   }
 }
 
-// Sets of ascending ids. What comes and goes at the threshold is not worth another fit.
-bool AlmostTheSame(const std::vector<int64_t>& a, const std::vector<int64_t>& b) {
-  constexpr double kShare = 0.1;
+// Of two sets of ascending ids, the first of them of the tracks that were tested. What comes and
+// goes at the threshold is not worth another fit.
+bool AlmostTheSame(const std::vector<int64_t>& moving, const std::vector<int64_t>& left_out,
+                   const std::vector<TrackLean>& leans) {
+  // Of the tracks that move.
+  constexpr double kTracks = 0.1;
+  // Of all matches: points at rest that come or go with so many move a fit by a tenth of its sigma
+  // (their noise is independent: the root of it), as far as a solve stops from its minimum. Those
+  // that no fit has been without are not at the threshold.
+  constexpr double kMatches = 0.01;
   std::vector<int64_t> differ;
-  std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(differ));
-  return static_cast<double>(differ.size()) <=
-         kShare * static_cast<double>(std::max(a.size(), b.size()));
+  std::set_symmetric_difference(moving.begin(), moving.end(), left_out.begin(), left_out.end(),
+                                std::back_inserter(differ));
+  if (static_cast<double>(differ.size()) <=
+      kTracks * static_cast<double>(std::max(moving.size(), left_out.size()))) {
+    return true;
+  }
+  double all = 0.0, of_differing = 0.0;
+  for (const TrackLean& lean : leans) {
+    all += lean.matches;
+    if (std::binary_search(differ.begin(), differ.end(), lean.track_id)) {
+      of_differing += lean.matches;
+    }
+  }
+  return !left_out.empty() && of_differing <= kMatches * all;
 }
 
 }  // namespace
@@ -74,7 +92,7 @@ Result<StillFit> FitWhatIsStill(const EstimationInput& input, const std::vector<
     const std::vector<TrackLean> leans =
         LeanOfTracks(input, pairs, still.fit.calibration, still.fit.quality.noise_px, options);
     std::vector<int64_t> moving = MovingTracks(leans);
-    if (AlmostTheSame(moving, left_out)) break;
+    if (AlmostTheSame(moving, left_out, leans)) break;
     std::vector<TimedPair> at_rest = WithoutTracks(pairs, moving);
     Result<Refined> next = fit(at_rest, &still.fit);
     if (!next) break;

@@ -33,10 +33,10 @@ struct StillFit {
   int tracks = 0, moving = 0;
 };
 // The tracks are tested under a fit of all pairs, and again under that of those at rest, until nine
-// tenths of them stay the same, at most kMostTests times. `fit`: of some pairs, from a start with
-// the noise so far, none for the first. Nothing is left out of attitudes, of transfers, of matches
-// without tracks, and without a robust loss. Errors: of the first fit; where a later one fails, the
-// one before stands.
+// tenths of them stay the same, or all but 1 % of the matches, at most kMostTests times. `fit`: of
+// some pairs, from a start with the noise so far, none for the first. Nothing is left out of
+// attitudes, of transfers, of matches without tracks, and without a robust loss. Errors: of the
+// first fit; where a later one fails, the one before stands.
 using FitOfPairs =
     std::function<Result<Refined>(const std::vector<TimedPair>& pairs, const Refined* before)>;
 constexpr int kMostTests = 3;
