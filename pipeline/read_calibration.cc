@@ -314,6 +314,7 @@ CalibrationReport ParseReport(const YAML::Node& root) {
   report.quality.inlier_ratio = quality.Number("inlier_ratio", 0.0);
   report.quality.noise_px = quality.Number("noise_px", 0.0);
   report.quality.noise_scatter = quality.Number("noise_scatter", 0.0);
+  report.quality.design_effect = quality.Number("design_effect", 1.0);
   report.quality.rms_px = quality.Number("rms_px", 0.0);
   return report;
 }

@@ -162,7 +162,10 @@ void EmitQuality(YAML::Emitter& out, const CalibrationReport& report, bool attit
   out << YAML::Key << "matches" << YAML::Value << quality.matches;
   out << YAML::Key << "inlier_ratio" << YAML::Value << quality.inlier_ratio;
   out << YAML::Key << (attitudes ? "noise_rad" : "noise_px") << YAML::Value << quality.noise_px;
-  if (!attitudes) out << YAML::Key << "noise_scatter" << YAML::Value << quality.noise_scatter;
+  if (!attitudes) {
+    out << YAML::Key << "noise_scatter" << YAML::Value << quality.noise_scatter;
+    out << YAML::Key << "design_effect" << YAML::Value << quality.design_effect;
+  }
   out << YAML::Key << (attitudes ? "rms_rad" : "rms_px") << YAML::Value << quality.rms_px;
   if (report.unseen) {
     out << YAML::Key << "unseen_rms_px" << YAML::Value << report.unseen->rms_px;

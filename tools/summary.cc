@@ -139,6 +139,8 @@ std::string StartLine(const StartResult& start) {
 // Below, a reader need not know: in docs/lab/measured.md it is 0.07 at most where pairs are equally
 // noisy and the lens is in the model.
 constexpr double kScatterWorthSaying = 0.1;
+// Of the design effect: sigmas are wider by half as much.
+constexpr double kEffectWorthSaying = 1.1;
 
 std::string QualityLine(const CalibrationReport& report, bool attitudes) {
   const FitQuality& quality = report.quality;
@@ -149,6 +151,9 @@ std::string QualityLine(const CalibrationReport& report, bool attitudes) {
   std::string line = Format("fit        %d pairs", quality.pairs);
   // The online pass counts no matches.
   if (quality.matches > 0) line += Format(", %d matches", quality.matches);
+  if (quality.design_effect > kEffectWorthSaying) {
+    line += Format(" (worth %.0f independent ones)", quality.matches / quality.design_effect);
+  }
   line += Format(", noise %.3f px", quality.noise_px);
   if (quality.noise_scatter > kScatterWorthSaying) {
     line += Format(" (%.0f %% more or less from pair to pair)", 100.0 * quality.noise_scatter);

@@ -18,6 +18,8 @@ struct FitQuality {
   double noise_px = 0.0;      // robust standard deviation per axis (attitudes: rad)
   // How that scatters from pair to pair: rms of the logarithms of the pairs' factors.
   double noise_scatter = 0.0;
+  // NeighbourCorrelation::DesignEffect: so many matches tell what an independent one would.
+  double design_effect = 1.0;
   double rms_px = 0.0;        // of residuals, each bounded by the loss
   double usual_rms_px = 0.0;  // FitSum::usual_rms
 };

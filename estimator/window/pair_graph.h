@@ -15,6 +15,7 @@
 
 #include "core/calibration.h"
 #include "core/result.h"
+#include "estimator/window/cross_fit.h"
 #include "estimator/window/factor_graph.h"
 #include "estimator/window/frame_times.h"
 #include "estimator/window/kept_cost.h"
@@ -27,30 +28,6 @@
 #include "factors/pair_bearings.h"
 
 namespace camgyro {
-
-// Sums of squared residuals, bounded as by the loss, of matches that had a say in their pair's
-// direction and of the same matches without one. A direction that is the best of many which all say
-// little takes more of the variance than its degrees of freedom, and where it takes noise for a
-// direction, the information that is left is too large by as much.
-struct CrossFit {
-  double own = 0.0;       // under the pair's direction and bend, corrected for degrees of freedom
-  double expected = 0.0;  // of the next, where every direction is well determined
-  double unseen = 0.0;    // each half of the matches under direction and bend of the other half
-
-  CrossFit& operator+=(const CrossFit& other) {
-    own += other.own;
-    expected += other.expected;
-    unseen += other.unseen;
-    return *this;
-  }
-  CrossFit operator*(double factor) const {
-    return {factor * own, factor * expected, factor * unseen};
-  }
-  // By how much to widen the covariance of what the pairs determine (>= 1).
-  double inflation() const {
-    return own > 0.0 ? std::max(1.0, unseen / own) * std::max(1.0, unseen / expected) : 1.0;
-  }
-};
 
 // What a graph has found for each pair and frame: where another fit of them begins.
 struct PairLatents {

@@ -70,12 +70,15 @@ CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
   const std::vector<double> own =
       Residuals(id, /*search=*/false, 0.0, bearings);  // fills the bearings, too
   if (own.size() < 2 * kMinMatches) return fit;
+  // Of a Gaussian error none is beyond, and what moves is [sigmas].
+  constexpr double kNeighboursWithin = 3.5;
   const Pair& pair = pairs_.at(id);
   const PairView view = ViewOf(pair, *bearings);
   const auto bounded_sq = [&](double r) {
     return std::pow(Robustify(r, options_.robust_threshold).value, 2);
   };
   for (const double r : own) fit.own += bounded_sq(r);
+  fit.neighbours.Add(pair.measurement->matches, own, kNeighboursWithin, pair.measurement->size_px);
   const auto n = static_cast<double>(own.size());
   const PairPlane whole{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
   fit.own *= n / (n - DegreesOfFreedom(view, whole));

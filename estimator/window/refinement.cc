@@ -348,6 +348,7 @@ class Refinement {
     double scatter_sq = 0.0;
     for (const double factor : noise_now_.factors) scatter_sq += std::pow(std::log(factor), 2);
     q.noise_scatter = std::sqrt(scatter_sq / static_cast<double>(noise_now_.factors.size()));
+    q.design_effect = cross_fit.neighbours.DesignEffect();
     q.matches = sum.matches();
     q.rms_px = noise_now_.scale * sum.rms();
     q.usual_rms_px = noise_now_.scale * sum.usual_rms();

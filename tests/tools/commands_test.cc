@@ -122,7 +122,7 @@ TEST_F(CommandsTest, CalibrateWritesTheResultAndSaysIt) {
               result["clock"]["delay_s"]["sigma"].as<double>(), 1e-12);
   EXPECT_NEAR(result["quality"]["noise_px"].as<double>(), 0.2, 0.03);
   for (const char* key : {"pairs", "matches", "inlier_ratio", "rms_px", "unseen_rms_px",
-                          "halves_chi2", "noise_over_smooth", "unobservable"}) {
+                          "halves_chi2", "noise_over_smooth", "design_effect", "unobservable"}) {
     EXPECT_TRUE(result["quality"][key]) << key;
   }
   EXPECT_NEAR(result["quality"]["noise_over_smooth"].as<double>(), 1.0, 0.2);
