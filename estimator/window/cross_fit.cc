@@ -12,15 +12,16 @@ void NeighbourCorrelation::Add(const std::vector<Match>& matches,
   if (residuals.empty()) return;
   CHECK_EQ(matches.size(), residuals.size());
   const double bins_per_px = kBinsPerDiagonal / size_px.norm();
+  const double farthest_sq = std::pow((static_cast<double>(kBins) - 1e-9) / bins_per_px, 2);
   for (size_t i = 0; i < matches.size(); ++i) {
     if (std::abs(residuals[i]) > most) continue;
     matches_ += 1.0;
     squares_ += residuals[i] * residuals[i];
     for (size_t k = i + 1; k < matches.size(); ++k) {
       if (std::abs(residuals[k]) > most) continue;
-      const double distance = bins_per_px * (matches[k].px_b - matches[i].px_b).norm();
-      if (!(distance < static_cast<double>(kBins))) continue;
-      const auto bin = static_cast<size_t>(distance);
+      const double distance_sq = (matches[k].px_b - matches[i].px_b).squaredNorm();
+      if (!(distance_sq < farthest_sq)) continue;
+      const auto bin = static_cast<size_t>(bins_per_px * std::sqrt(distance_sq));
       pairs_[bin] += 1.0;
       products_[bin] += residuals[i] * residuals[k];
     }

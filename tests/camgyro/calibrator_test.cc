@@ -146,7 +146,7 @@ TEST(Calibrator, FramesThatCameLateHaveTimesOfTheirOwn) {
   // A pair tells mostly the difference of its two frames' offsets.
   EXPECT_LT(std::sqrt(sum_sq_s / estimates), 1.2e-3);
   EXPECT_LT(sum_sq_sigmas / estimates, 1.5);            // latencies are not Gaussian
-  const auto largest_error = [&](const Snapshot& of) {  // in sigmas
+  const auto largest_error = [&](const Snapshot& of) {  // in sigmas of this one
     const Calibration& c = of.calibration;
     double largest = 0.0;
     for (const auto& [parameter, error] :
@@ -155,7 +155,7 @@ TEST(Calibrator, FramesThatCameLateHaveTimesOfTheirOwn) {
           std::pair(kCy, c.principal_px[1] - s.truth.lens[camgyro::kCy]),
           std::pair(kReadout, c.readout_s - s.truth.readout_s),
           std::pair(kDelay, c.delay_s - (s.truth.delay_s - 2e-3))}) {
-      largest = std::max(largest, std::abs(error) / of.parameters[parameter].sigma);
+      largest = std::max(largest, std::abs(error) / snapshot->parameters[parameter].sigma);
     }
     return largest;
   };
@@ -175,7 +175,8 @@ TEST(Calibrator, FramesThatCameLateHaveTimesOfTheirOwn) {
   Feed(other.get(), r);
   ASSERT_TRUE(other->WaitUntilIdle(120.0));
   EXPECT_EQ(other->snapshot()->frame_jitter_s, 0.0);
-  EXPECT_GT(largest_error(*other->snapshot()), 4.0);
+  // Its own sigmas see that its residuals are alike in neighbours, and are larger.
+  EXPECT_GT(largest_error(*other->snapshot()), 3.0);
 }
 
 // The delay of a flight controller's stamps, which grows by 20 to 30 ms in a minute.

@@ -106,7 +106,7 @@ TEST_F(ReadCalibrationTest, AReportIsReadBackToBeCombined) {
   report.prior.sigma = StateVector::LinSpaced(1.0, 11.0);
   report.device_class = "phone";
   report.systematic = {{"gyro_scale", StateVector::LinSpaced(0.0, 1.0)}};
-  report.quality = {100, 5000, 0.75, 0.5, 0.25, 0.625};
+  report.quality = {100, 5000, 0.75, 0.5, 0.25, 2.5, 0.625};
   const std::string yaml = CalibrationYaml(report, /*attitudes=*/false);
   const auto read_report = [&](const std::string& text) {
     std::ofstream(Path("c.yaml")) << text;
@@ -123,6 +123,7 @@ TEST_F(ReadCalibrationTest, AReportIsReadBackToBeCombined) {
   EXPECT_EQ(read->systematic[0].effect, "gyro_scale");
   EXPECT_LT((read->systematic[0].sigma - report.systematic[0].sigma).norm(), 1e-9);
   EXPECT_EQ(read->quality.matches, 5000);
+  EXPECT_EQ(read->quality.design_effect, 2.5);
   EXPECT_EQ(read->quality.rms_px, 0.625);
 
   const auto with = [&](const std::string& before, const std::string& after) {
