@@ -13,9 +13,9 @@
 namespace camgyro {
 
 // How far the errors of matches hang together with those of their neighbours in the picture. A
-// calibration adds up what matches tell as if each had an error of its own. Real pictures are not
-// like that: blur, compression and the patches' change of shape shift what lies side by side alike,
-// over 60 px of a phone's 640 x 480 (docs/lab/tracking.md#errors-of-neighbours).
+// calibration adds up what matches tell as if each had an error of its own. In real pictures what
+// lies side by side is shifted alike, up to 80 px apart in a phone's 640 x 480; compression does
+// that (docs/lab/tracking.md#errors-of-neighbours).
 class NeighbourCorrelation {
  public:
   // residuals: of the matches, in sigmas; none, or as many (CHECKed). Those beyond `most` are of
