@@ -31,7 +31,7 @@ bool AlmostTheSame(const std::vector<int64_t>& moving, const std::vector<int64_t
   // Of the tracks that move.
   constexpr double kTracks = 0.1;
   // Of all matches: points at rest that come or go with so many move a fit by a tenth of its sigma
-  // (their noise is independent: the root of it), as far as a solve stops from its minimum. Those
+  // (the root of it, of independent noise), as far as a solve stops from its minimum. Those
   // that no fit has been without are not at the threshold.
   constexpr double kMatches = 0.01;
   std::vector<int64_t> differ;

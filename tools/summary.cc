@@ -139,7 +139,7 @@ std::string StartLine(const StartResult& start) {
 // Below, a reader need not know: in docs/lab/measured.md it is 0.07 at most where pairs are equally
 // noisy and the lens is in the model.
 constexpr double kScatterWorthSaying = 0.1;
-// Of the design effect: sigmas are wider by half as much.
+// Of the design effect: below, sigmas are wider by less than 5 %.
 constexpr double kEffectWorthSaying = 1.1;
 
 std::string QualityLine(const CalibrationReport& report, bool attitudes) {

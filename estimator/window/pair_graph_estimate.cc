@@ -70,7 +70,7 @@ CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
   const std::vector<double> own =
       Residuals(id, /*search=*/false, 0.0, bearings);  // fills the bearings, too
   if (own.size() < 2 * kMinMatches) return fit;
-  // Of a Gaussian error none is beyond, and what moves is [sigmas].
+  // One in 2000 Gaussian errors is beyond; wrong matches, which the loss bounds, are [sigmas].
   constexpr double kNeighboursWithin = 3.5;
   const Pair& pair = pairs_.at(id);
   const PairView view = ViewOf(pair, *bearings);
