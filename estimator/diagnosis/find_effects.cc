@@ -134,11 +134,13 @@ void AddFrameTimes(const SharedFits& fits, const Refined& now, const RoundScores
   std::vector<TimedPair> far = Joined(fits.shares().fit);
   const std::vector<TimedPair> choice = Joined(fits.shares().choice);
   far.insert(far.end(), choice.begin(), choice.end());
-  const auto halves = [&](const std::vector<TimedPair>& pairs) {
-    return ScoreHalves(fits.input(), pairs, now.calibration, now.quality.noise_px, fits.in().graph);
+  const auto halves = [&](const std::vector<TimedPair>& pairs, SplitOfMatches split) {
+    return ScoreHalves(fits.input(), pairs, now.calibration, now.quality.noise_px, fits.in().graph,
+                       split);
   };
-  const FrameTimeTest found =
-      TestFrameTimes(halves(fits.near_pairs()), halves(far), round.prior.head(round.fit.num_model));
+  const FrameTimeTest found = TestFrameTimes(halves(fits.near_pairs(), SplitOfMatches::kSides),
+                                             halves(far, SplitOfMatches::kEveryOther),
+                                             round.prior.head(round.fit.num_model));
   ScoreTest test;
   test.dof = 1;
   test.statistic = std::pow(std::max(0.0, found.times.sigmas), 2);

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <random>
@@ -22,11 +23,21 @@ using Rows2 = Eigen::Matrix<double, 2, 5>;
 using Rows3 = Eigen::Matrix<double, 3, 5>;
 using Matrix5Xd = Eigen::Matrix<double, 5, Eigen::Dynamic>;
 
-TimedPair HalfOf(const TimedPair& pair, size_t which) {
-  TimedPair half = pair;
-  half.matches.clear();
-  for (size_t i = which; i < pair.matches.size(); i += 2) half.matches.push_back(pair.matches[i]);
-  return half;
+// As many matches in each.
+std::array<TimedPair, 2> Split(const TimedPair& pair, SplitOfMatches split) {
+  std::vector<double> x;
+  for (const Match& match : pair.matches) x.push_back(match.px_b.x());
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  if (middle != x.end()) std::nth_element(x.begin(), middle, x.end());
+  std::array<TimedPair, 2> halves = {pair, pair};
+  for (TimedPair& half : halves) half.matches.clear();
+  for (size_t i = 0; i < pair.matches.size(); ++i) {
+    const Match& match = pair.matches[i];
+    const size_t half =
+        split == SplitOfMatches::kEveryOther ? i % 2 : (match.px_b.x() < *middle ? 0 : 1);
+    halves[half].matches.push_back(match);
+  }
+  return halves;
 }
 
 // A half with what is the pair's own projected out, and how the gyro's noise, in sigmas, enters the
@@ -59,41 +70,35 @@ Projected Project(const PairSystem& s) {
 
 std::optional<HalvesOfPair> HalvesOf(const EstimationInput& input, const TimedPair& pair,
                                      const Calibration& calibration, const AllEffects& all,
-                                     double noise, const PairGraphOptions& options) {
-  HalvesOfPair both;
-  std::array<Projected, 2> projected;
-  for (size_t k = 0; k < 2; ++k) {
+                                     double noise, const PairGraphOptions& options,
+                                     SplitOfMatches split) {
+  const auto project = [&](const TimedPair& matches) {
     PairSystem system;
-    if (!MakePairSystem(input, HalfOf(pair, k), calibration, all, noise, options, &system)) {
-      return std::nullopt;
-    }
-    projected[k] = Project(system);
-    both.halves[k] = std::move(projected[k].half);
-  }
-  both.common = projected[0].by_gyro * projected[1].by_gyro.transpose();
+    return MakePairSystem(input, matches, calibration, all, noise, options, &system)
+               ? std::optional<Projected>(Project(system))
+               : std::nullopt;
+  };
+  const std::array<TimedPair, 2> halves = Split(pair, split);
+  std::optional<Projected> first = project(halves[0]), second = project(halves[1]);
+  std::optional<Projected> whole = project(pair);
+  if (!first || !second || !whole) return std::nullopt;
+  HalvesOfPair both;
+  both.common = first->by_gyro * second->by_gyro.transpose();
+  both.halves = {std::move(first->half), std::move(second->half)};
+  both.whole = std::move(whole->half);
   return both;
 }
 
-// How the model's columns change with all pairs of one half.
-Eigen::VectorXd ModelStep(const std::vector<HalvesOfPair>& pairs, size_t half,
-                          const Eigen::VectorXd& prior) {
-  const Eigen::Index n = prior.size();
-  Eigen::MatrixXd H = prior.asDiagonal();
-  Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
-  for (const HalvesOfPair& pair : pairs) {
-    H += pair.halves[half].H.topLeftCorner(n, n);
-    g += pair.halves[half].g.head(n);
-  }
-  return -SymmetricSolver(H, kSmallRidge).Solve(g);
-}
+using Half = HalvesOfPair::Half;
 
-// Score and information of bias and offsets in one half, the model projected out of all pairs.
+// Score and information of bias and offsets in one half, or the whole, of a pair's matches, the
+// model projected out of the sum over all pairs.
 struct Own {
   Eigen::Matrix<double, 5, 1> s;
   Matrix5d W;
 };
 
-Own OwnOf(const HalvesOfPair::Half& half, const Eigen::VectorXd& step) {
+Own OwnOf(const Half& half, const Eigen::VectorXd& step) {
   const Eigen::Index n = step.size();
   const std::array<Eigen::Index, 5> at = {kStateBias, kStateBias + 1, kStateBias + 2, n, n + 1};
   Own own;
@@ -105,27 +110,46 @@ Own OwnOf(const HalvesOfPair::Half& half, const Eigen::VectorXd& step) {
   return own;
 }
 
-// Of all pairs, the model's columns projected out of each half's sum.
-std::vector<std::array<Own, 2>> OwnOf(const std::vector<HalvesOfPair>& pairs,
-                                      const Eigen::VectorXd& prior) {
-  const std::array<Eigen::VectorXd, 2> steps = {ModelStep(pairs, 0, prior),
-                                                ModelStep(pairs, 1, prior)};
-  std::vector<std::array<Own, 2>> own;
+// Of all pairs: `part` is what counts of each.
+template <typename Part>
+std::vector<Own> OwnOfAll(const std::vector<HalvesOfPair>& pairs, const Eigen::VectorXd& prior,
+                          const Part& part) {
+  const Eigen::Index n = prior.size();
+  Eigen::MatrixXd H = prior.asDiagonal();
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
   for (const HalvesOfPair& pair : pairs) {
-    own.push_back({OwnOf(pair.halves[0], steps[0]), OwnOf(pair.halves[1], steps[1])});
+    H += part(pair).H.topLeftCorner(n, n);
+    g += part(pair).g.head(n);
   }
+  const Eigen::VectorXd step = -SymmetricSolver(H, kSmallRidge).Solve(g);
+  std::vector<Own> own;
+  for (const HalvesOfPair& pair : pairs) own.push_back(OwnOf(part(pair), step));
   return own;
 }
 
-// Both halves together. Frames of different pairs count as different ones.
-std::vector<PairTimes> WholePairs(const std::vector<std::array<Own, 2>>& own) {
-  std::vector<PairTimes> whole;
-  for (const auto& [a, b] : own) {
-    const auto frame = static_cast<int64_t>(2 * whole.size());
-    whole.push_back({frame, frame + 1, a.s.tail<2>() + b.s.tail<2>(),
-                     a.W.bottomRightCorner<2, 2>() + b.W.bottomRightCorner<2, 2>()});
+// The halves of all pairs.
+std::vector<std::array<Own, 2>> OwnOfHalves(const std::vector<HalvesOfPair>& pairs,
+                                            const Eigen::VectorXd& prior) {
+  const auto half = [&](size_t k) {
+    return OwnOfAll(pairs, prior,
+                    [k](const HalvesOfPair& pair) -> const Half& { return pair.halves[k]; });
+  };
+  const std::vector<Own> first = half(0), second = half(1);
+  std::vector<std::array<Own, 2>> own;
+  for (size_t i = 0; i < pairs.size(); ++i) own.push_back({first[i], second[i]});
+  return own;
+}
+
+// What the pairs say of times. Frames of different pairs count as different ones.
+std::vector<PairTimes> TimesOf(const std::vector<HalvesOfPair>& pairs,
+                               const Eigen::VectorXd& prior) {
+  std::vector<PairTimes> times;
+  const auto whole = [](const HalvesOfPair& pair) -> const Half& { return pair.whole; };
+  for (const Own& own : OwnOfAll(pairs, prior, whole)) {
+    const auto frame = static_cast<int64_t>(2 * times.size());
+    times.push_back({frame, frame + 1, own.s.tail<2>(), own.W.bottomRightCorner<2, 2>()});
   }
-  return whole;
+  return times;
 }
 
 // Picks rotations out of bias and offsets, with whatever times there are projected out.
@@ -183,12 +207,12 @@ double InCommon(const Own& a, const Own& b, const Transform& T_a, const Transfor
 std::vector<HalvesOfPair> ScoreHalves(const EstimationInput& input,
                                       const std::vector<TimedPair>& pairs,
                                       const Calibration& calibration, double noise,
-                                      const PairGraphOptions& options) {
+                                      const PairGraphOptions& options, SplitOfMatches split) {
   AllEffects all = AllEffectsOf(calibration, nullptr);
   all.with_times = true;
   std::vector<std::optional<HalvesOfPair>> found(pairs.size());
   ParallelFor(pairs.size(), [&](size_t i) {
-    found[i] = HalvesOf(input, pairs[i], calibration, all, noise, options);
+    found[i] = HalvesOf(input, pairs[i], calibration, all, noise, options, split);
   });
   std::vector<HalvesOfPair> halves;
   for (auto& pair : found) {
@@ -214,7 +238,8 @@ FrameTimeTest TestFrameTimes(const std::vector<HalvesOfPair>& near,
   Rows2 pick_times = Rows2::Zero();
   pick_times.rightCols<2>().setIdentity();
   std::vector<double> near_times, far_times, rest;
-  const auto near_own = OwnOf(near, prior_information), far_own = OwnOf(far, prior_information);
+  const auto near_own = OwnOfHalves(near, prior_information);
+  const auto far_own = OwnOfHalves(far, prior_information);
   for (size_t i = 0; i < near.size(); ++i) {
     const auto& [a, b] = near_own[i];
     near_times.push_back(InCommon(a, b, pick_times, pick_times, times_prior, near[i].common));
@@ -227,8 +252,8 @@ FrameTimeTest TestFrameTimes(const std::vector<HalvesOfPair>& near,
   test.times = Judge(near_times);
   test.far_times = Judge(far_times);
   test.rest = Judge(rest);
-  test.spread = MostLikelySpread(WholePairs(near_own));
-  test.far_spread = MostLikelySpread(WholePairs(far_own));
+  test.spread = MostLikelySpread(TimesOf(near, prior_information));
+  test.far_spread = MostLikelySpread(TimesOf(far, prior_information));
   return test;
 }
 

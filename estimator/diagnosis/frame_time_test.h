@@ -18,15 +18,25 @@
 
 namespace camgyro {
 
-// What the two halves of one pair's matches (every other one) say, each with a direction of its
-// own. Columns: state and effects of the model, then the offsets of its first and of its second
-// frame from their stamps [s].
+enum class SplitOfMatches {
+  // Left and right. Neighbours may be shifted alike (docs/lab/tracking.md#errors-of-neighbours),
+  // which halves that lie among each other would take for something that all matches share.
+  kSides,
+  // Each half sees all of the picture, and tells rotations better from the direction of
+  // translation.
+  kEveryOther,
+};
+
+// What the two halves of one pair's matches, and all of them, say, each with a direction of its
+// own. Columns: state and effects of the model, then the offsets of its first and
+// of its second frame from their stamps [s].
 struct HalvesOfPair {
   struct Half {
     Eigen::VectorXd g;  // half the derivative of chi2, what is the pair's own projected out
     Eigen::MatrixXd H;
   };
   std::array<Half, 2> halves;
+  Half whole;
   // Covariance of the first half's score (rows) and the second's (columns) by the noise of the
   // gyro, which both share: of the bias, three, and of the offsets, two.
   Eigen::Matrix<double, 5, 5> common;
@@ -38,7 +48,7 @@ struct HalvesOfPair {
 std::vector<HalvesOfPair> ScoreHalves(const EstimationInput& input,
                                       const std::vector<TimedPair>& pairs,
                                       const Calibration& calibration, double noise,
-                                      const PairGraphOptions& options);
+                                      const PairGraphOptions& options, SplitOfMatches split);
 
 // HalvesAgreement of halves in some columns: the sum over pairs of x = s1 . A s2 - E[s1 . A s2],
 // with s1 and s2 the halves' scores, the model projected out of all pairs of each half on its own,
@@ -72,7 +82,9 @@ struct FrameTimeTest {
   bool is_of_times() const;
 };
 
-// Significance is by the near pairs alone. prior_information: 1 / sigma^2 of the model's columns.
+// Significance is by the near pairs alone, which are split into sides (kSides); is_of_times by the
+// far ones, too, of which more may seem to be of something else if every other match is in a half
+// (kEveryOther). prior_information: 1 / sigma^2 of the model's columns.
 // The p-value is 1 if there are fewer than kLeastPairsOfHalves near pairs.
 FrameTimeTest TestFrameTimes(const std::vector<HalvesOfPair>& near,
                              const std::vector<HalvesOfPair>& far,

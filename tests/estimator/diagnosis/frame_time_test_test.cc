@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/so3.h"
@@ -47,11 +50,12 @@ FrameTimeTest TestTimes(const simulation::Simulated& simulated) {
   PairGraphOptions options;
   options.match_noise = recording.match_noise;
   options.gyro_sigma_rad_s = GyroSigma(recording, model.delay_s);
-  const auto halves = [&](const PairSelection& selection) {
+  const auto halves = [&](const PairSelection& selection, SplitOfMatches split) {
     const EstimationInput input = MakeEstimationInput(recording, selection);
-    return ScoreHalves(input, input.pairs, model, kAssumedPx, options);
+    return ScoreHalves(input, input.pairs, model, kAssumedPx, options, split);
   };
-  return TestFrameTimes(halves({1, 2}), halves({5, 2}),
+  return TestFrameTimes(halves({1, 2}, SplitOfMatches::kSides),
+                        halves({5, 2}, SplitOfMatches::kEveryOther),
                         PriorInformation(prior, nullptr, EffectSet()));
 }
 
@@ -80,6 +84,29 @@ TEST(FrameTimeTest, PValuesAreUniformWhateverTheNoise) {
   EXPECT_GT(p_values.front(), 0.001);
 }
 
+// Compression moves blocks of a picture as a whole, each by an amount of its own.
+TEST(FrameTimeTest, BlocksThatMoveAsAWholeAreNotOfTimes) {
+  constexpr double kBlockPx = 48.0;
+  std::vector<double> p_values;
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    simulation::Simulated simulated =
+        SimulateShort(seed, {"motion.kind=running", "tracks.count=150", "tracks.noise_px=0.2"});
+    std::mt19937_64 random{seed};
+    std::normal_distribution<double> shift_px{0.0, 0.5};
+    for (std::vector<TrackedPoint>& points : simulated.recording.tracks) {
+      std::map<std::pair<int, int>, Eigen::Vector2d> shifts;
+      for (TrackedPoint& point : points) {
+        const std::pair<int, int> block{static_cast<int>(point.px.x() / kBlockPx),
+                                        static_cast<int>(point.px.y() / kBlockPx)};
+        const double u = shift_px(random), v = shift_px(random);
+        point.px += shifts.try_emplace(block, u, v).first->second;
+      }
+    }
+    p_values.push_back(TestTimes(simulated).times.p_value);
+  }
+  EXPECT_THAT(p_values, testing::Each(testing::Gt(0.01)));
+}
+
 TEST(FrameTimeTest, FindsTwoMilliseconds) {
   for (const char* motion : {"walking", "running", "handheld"}) {
     SCOPED_TRACE(motion);
@@ -96,12 +123,12 @@ TEST(FrameTimeTest, FindsTwoMilliseconds) {
 // A camera that shakes in its mount turns the picture about any axis: the halves agree, in times,
 // too, but not in times alone.
 TEST(FrameTimeTest, APictureThatShakesIsNotOfTimes) {
-  simulation::Simulated simulated = SimulateShort(5, {});
+  simulation::Simulated simulated = SimulateShort(5, {"duration_s=20", "motion.kind=handheld"});
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;
   for (std::vector<TrackedPoint>& points : simulated.recording.tracks) {
-    const double u = 3.0 * normal(random);
-    const double v = 3.0 * normal(random);
+    const double u = 1.5 * normal(random);
+    const double v = 1.5 * normal(random);
     for (TrackedPoint& point : points) point.px += Eigen::Vector2d(u, v);
   }
   const FrameTimeTest test = TestTimes(simulated);
@@ -113,7 +140,7 @@ TEST(FrameTimeTest, APictureThatShakesIsNotOfTimes) {
 // A gyro that reads too much at high rates turns about the axis of the rotation, which times do,
 // too, but not by as much for frames that are near.
 TEST(FrameTimeTest, AGyroThatIsNotLinearIsNotOfTimes) {
-  simulation::Simulated simulated = SimulateShort(8, {"motion.kind=running"});
+  simulation::Simulated simulated = SimulateShort(8, {"motion.kind=running", "duration_s=20"});
   for (GyroSample& sample : simulated.recording.gyro) {
     const Eigen::Vector3d omega = sample.omega_gyro_rad_s;
     sample.omega_gyro_rad_s += 0.08 * omega.cwiseAbs().cwiseProduct(omega);
@@ -145,6 +172,7 @@ TEST(FrameTimeTest, AgreementOfHalvesByHand) {
       pair.halves[k].g[model] = (k == 0 ? 1.0 : sign) * 3e4;
       pair.halves[k].H(model, model) = 1e8;  // 0.1 ms
     }
+    pair.whole = pair.halves[0];
     pair.common.setZero();
     return std::vector<HalvesOfPair>(n, pair);
   };
