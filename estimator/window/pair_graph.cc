@@ -144,7 +144,7 @@ std::shared_ptr<PairMeasurement> PairGraph::Measure(const TimedPair& pair) const
   m.frame_b = pair.second();
   m.size_px << prior_mean_.width_px, prior_mean_.height_px;
   m.effects = effects_;
-  m.by_lens = DerivativesFor(effects_.get());
+  m.by_lens = options_.hold_shared ? LensDerivatives::kNone : DerivativesFor(effects_.get());
   m.sigma = options_.first_sigma() * pair.noise_factor;
   m.noise = options_.match_noise;
   m.robust_threshold = options_.robust_threshold;

@@ -147,13 +147,17 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
   m.effects = calibration.pair_effects().set != nullptr ? calibration.effects : nullptr;
   const RotationChain chain(m.rate_times_s, view->rates);
   const Eigen::Matrix3d R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
-  view->bearings = {};
+  for (auto* bearings : {&view->bearings.a, &view->bearings.b}) {
+    bearings->clear();
+    bearings->reserve(pair.matches.size());
+  }
+  const auto evaluate = [&](const FrameTime& frame, const Eigen::Vector2d& px, Bearing* bearing) {
+    return EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, frame, m.size_px,
+                           px, calibration.pair_effects(), bearing, LensDerivatives::kNone);
+  };
   Bearing a, b;
   for (const Match& match : pair.matches) {
-    if (EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, m.frame_a, m.size_px,
-                        match.px_a, calibration.pair_effects(), &a) &&
-        EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, m.frame_b, m.size_px,
-                        match.px_b, calibration.pair_effects(), &b) &&
+    if (evaluate(m.frame_a, match.px_a, &a) && evaluate(m.frame_b, match.px_b, &b) &&
         options.residual->HasResidual(*m.lens, calibration.lens, a, b)) {
       b.ScaleNoise(match.noise_factor_b);
       m.matches.push_back(match);

@@ -16,7 +16,7 @@ namespace camgyro {
 struct PairView {
   PairMeasurement measurement;  // those matches that have a residual; rates in one group
   Eigen::Matrix3Xd rates;       // readings less bias and effects [rad/s]
-  PairBearings bearings;        // with derivatives
+  PairBearings bearings;        // without derivatives by the lens
   BendVector bend_sigma_rad;    // prior
 };
 
