@@ -82,10 +82,10 @@ struct FrameTimeTest {
   bool is_of_times() const;
 };
 
-// Significance is by the near pairs alone, which are split into sides (kSides); is_of_times by the
-// far ones, too, of which more may seem to be of something else if every other match is in a half
-// (kEveryOther). prior_information: 1 / sigma^2 of the model's columns.
-// The p-value is 1 if there are fewer than kLeastPairsOfHalves near pairs.
+// Significance is by the near pairs alone, to be split into sides (kSides). is_of_times is by the
+// far ones, too; with every other match in a half (kEveryOther) these see best what is not of
+// times. prior_information: 1 / sigma^2 of the model's columns. The p-value is 1 if there are fewer
+// than kLeastPairsOfHalves near pairs.
 FrameTimeTest TestFrameTimes(const std::vector<HalvesOfPair>& near,
                              const std::vector<HalvesOfPair>& far,
                              const Eigen::VectorXd& prior_information);
