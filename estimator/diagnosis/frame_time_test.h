@@ -28,8 +28,8 @@ enum class SplitOfMatches {
 };
 
 // What the two halves of one pair's matches, and all of them, say, each with a direction of its
-// own. Columns: state and effects of the model, then the offsets of its first and
-// of its second frame from their stamps [s].
+// own. Columns: state and effects of the model, then the offsets of its first and of its second
+// frame from their stamps [s].
 struct HalvesOfPair {
   struct Half {
     Eigen::VectorXd g;  // half the derivative of chi2, what is the pair's own projected out
