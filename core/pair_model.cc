@@ -92,7 +92,7 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
           b->lens_ray.J_ray_lens * (b->change.lens_slope[static_cast<size_t>(k)] * values);
     }
   }
-  b->rotation = chain.At(time_s);
+  chain.At(time_s, &b->rotation);
   b->R_ref_cam = b->rotation.R_ref_gyro * R_gyro_cam;
   b->omega_cam_rad_s = R_gyro_cam.transpose() * b->rotation.omega_gyro_rad_s;
   b->ray_ref = b->R_ref_cam * b->lens_ray.ray;

@@ -30,47 +30,47 @@ RotationChain::RotationChain(const std::vector<double>& times_s,
     if (j + 1 < n) {
       const double dt = times_s_[j + 1] - times_s_[j];
       const Eigen::Vector3d theta = 0.5 * dt * (omega_.col(col) + omega_.col(col + 1));
-      const Eigen::Matrix3d J_phi_theta = prefix_[j] * LeftJacobian(theta);
-      prefix_[j + 1] = prefix_[j] + J_phi_theta * Hat(theta);  // Exp(theta) = I + J_l(theta) theta^
-      before = 0.5 * dt * J_phi_theta.transpose();
+      const TurnAndJacobian turn = TurnAndLeftJacobian(theta);
+      prefix_[j + 1] = prefix_[j] * turn.R;
+      before = 0.5 * dt * (prefix_[j] * turn.J_left).transpose();
       earlier += before;
     }
     whole_.middleRows<3>(3 * value_of_[j]) = earlier;
   }
 }
 
-RotationChain::State RotationChain::At(double time_s) const {
-  State state;
+void RotationChain::At(double time_s, State* state) const {
   const int last = size() - 1;
   const auto upper = std::upper_bound(times_s_.begin(), times_s_.end(), time_s);
   int j = static_cast<int>(upper - times_s_.begin()) - 1;
   Eigen::Vector3d theta;
   if (j < 0 || j >= last) {  // held rate outside the samples
     const int held = j < 0 ? 0 : last;
-    state.segment = j < 0 ? 0 : last - 1;
-    state.weight_next = j < 0 ? 0.0 : 1.0;
-    state.alpha_gyro_rad_s2.setZero();
+    state->segment = j < 0 ? 0 : last - 1;
+    state->weight_next = j < 0 ? 0.0 : 1.0;
+    state->alpha_gyro_rad_s2.setZero();
     const double duration = time_s - times_s_[static_cast<size_t>(held)];
-    (j < 0 ? state.theta_this_s : state.theta_next_s) = duration;
-    state.omega_gyro_rad_s = omega_.col(held);
-    theta = duration * state.omega_gyro_rad_s;
+    state->theta_this_s = j < 0 ? duration : 0.0;
+    state->theta_next_s = j < 0 ? 0.0 : duration;
+    state->omega_gyro_rad_s = omega_.col(held);
+    theta = duration * state->omega_gyro_rad_s;
     j = held;
   } else {
     const double t0 = times_s_[static_cast<size_t>(j)];
     const double dt = times_s_[static_cast<size_t>(j) + 1] - t0;
     const double elapsed = time_s - t0;
-    state.segment = j;
-    state.weight_next = elapsed / dt;
-    state.theta_next_s = 0.5 * elapsed * state.weight_next;
-    state.theta_this_s = elapsed - state.theta_next_s;
-    state.alpha_gyro_rad_s2 = (omega_.col(j + 1) - omega_.col(j)) / dt;
-    state.omega_gyro_rad_s = omega_.col(j) + elapsed * state.alpha_gyro_rad_s2;
-    theta = state.theta_this_s * omega_.col(j) + state.theta_next_s * omega_.col(j + 1);
+    state->segment = j;
+    state->weight_next = elapsed / dt;
+    state->theta_next_s = 0.5 * elapsed * state->weight_next;
+    state->theta_this_s = elapsed - state->theta_next_s;
+    state->alpha_gyro_rad_s2 = (omega_.col(j + 1) - omega_.col(j)) / dt;
+    state->omega_gyro_rad_s = omega_.col(j) + elapsed * state->alpha_gyro_rad_s2;
+    theta = state->theta_this_s * omega_.col(j) + state->theta_next_s * omega_.col(j + 1);
   }
   const Eigen::Matrix3d& start = prefix_[static_cast<size_t>(j)];
-  state.J_phi_theta = start * LeftJacobian(theta);
-  state.R_ref_gyro = start + state.J_phi_theta * Hat(theta);
-  return state;
+  const TurnAndJacobian turn = TurnAndLeftJacobian(theta);
+  state->J_phi_theta.noalias() = start * turn.J_left;
+  state->R_ref_gyro.noalias() = start * turn.R;
 }
 
 void RotationChain::AddRateGradient(const State& state, const Eigen::Vector3d& by_phi,

@@ -56,7 +56,12 @@ class RotationChain {
   int num_values() const { return value_of_.back() + 1; }
   const std::vector<double>& times_s() const { return times_s_; }
 
-  State At(double time_s) const;
+  State At(double time_s) const {
+    State state;
+    At(time_s, &state);
+    return state;
+  }
+  void At(double time_s, State* state) const;
 
   using RateGradient = Eigen::Ref<Eigen::Matrix3Xd, 0, Eigen::OuterStride<3>>;  // without gaps
   // Adds to `gradient` (3 x num_values) the derivative of a scalar by every value, given its

@@ -56,10 +56,13 @@ Eigen::Matrix<T, 3, 1> Log(const Eigen::Quaternion<T>& q) {
   return (angle / sine) * imag;
 }
 
-// Left Jacobian: Exp(phi + d) = Exp(J_l(phi) d) * Exp(phi) to first order.
-inline Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& phi) {
+// The matrix of Exp(phi), and its left Jacobian: Exp(phi + d) = Exp(J_l(phi) d) * Exp(phi) to first
+// order.
+struct TurnAndJacobian {
+  Eigen::Matrix3d R, J_left;
+};
+inline TurnAndJacobian TurnAndLeftJacobian(const Eigen::Vector3d& phi) {
   const double angle_sq = phi.squaredNorm();
-  const Eigen::Matrix3d hat = Hat(phi);
   double a, b;            // (1 - cos)/angle^2, (angle - sin)/angle^3
   if (angle_sq < 1e-2) {  // to 1e-14; a gyro sample's turn
     a = 0.5 - angle_sq * (1.0 / 24.0 - angle_sq * (1.0 / 720.0 - angle_sq / 40320.0));
@@ -69,7 +72,24 @@ inline Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& phi) {
     a = (1.0 - std::cos(angle)) / angle_sq;
     b = (angle - std::sin(angle)) / (angle_sq * angle);
   }
-  return Eigen::Matrix3d::Identity() + a * hat + b * hat * hat;
+  // J_l = I + a phi^ + b phi^ phi^ and R = I + J_l phi^, with phi^ phi^ = phi phi' - angle^2 I.
+  const double sine = 1.0 - b * angle_sq;  // sin / angle
+  const double cosine = 1.0 - a * angle_sq;
+  const auto sum = [&phi](double one, double skew, double square) {
+    const double x = phi.x(), y = phi.y(), z = phi.z();
+    const double sx = skew * x, sy = skew * y, sz = skew * z;
+    const double xy = square * x * y, yz = square * y * z, zx = square * z * x;
+    Eigen::Matrix3d m;
+    m << one + square * x * x, xy - sz, zx + sy,  //
+        xy + sz, one + square * y * y, yz - sx,   //
+        zx - sy, yz + sx, one + square * z * z;
+    return m;
+  };
+  return {sum(cosine, sine, a), sum(sine, a, b)};
+}
+
+inline Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& phi) {
+  return TurnAndLeftJacobian(phi).J_left;
 }
 
 // Right Jacobian: Exp(phi + d) = Exp(phi) * Exp(J_r(phi) d) to first order.

@@ -408,7 +408,7 @@ def main():
     parser.add_argument("--out", default=SOURCE + "/docs/lab/diagnosis_simulated.md")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
-    store = options.out.replace(".md", ".jsonl")
+    store = os.path.splitext(options.out)[0] + ".jsonl"
     results = {}
     if os.path.exists(store):
         with open(store, encoding="utf-8") as lines:

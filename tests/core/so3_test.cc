@@ -52,6 +52,7 @@ TEST(So3, JacobiansAreDerivativesOfExp) {
     };
     const Vector3d numeric = (left(h) - left(-h)) / (2 * h);
     EXPECT_LT((LeftJacobian(phi) * d - numeric).norm(), 1e-8) << scale;
+    EXPECT_LT((TurnAndLeftJacobian(phi).R - Exp(phi).toRotationMatrix()).norm(), 1e-14) << scale;
     EXPECT_LT((Exp(phi).toRotationMatrix() * RightJacobian(phi) - LeftJacobian(phi)).norm(), 1e-12)
         << scale;
     EXPECT_LT((LeftJacobian(phi) * LeftJacobianInverse(phi) - Matrix3d::Identity()).norm(), 1e-11)
