@@ -2,20 +2,23 @@
 
 #include <algorithm>
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include "core/parallel.h"
+#include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
 
 namespace camgyro {
 namespace {
 
 void AddLeans(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
-              double noise, const PairGraphOptions& options, TrackLeans* leans) {
+              double noise, const PairGraphOptions& options,
+              const std::optional<Eigen::Vector2d>& times_s, TrackLeans* leans) {
   PairView view;
   std::vector<MatchMisfit> misfits;
   if (!ResidualOf(pair, options)
-           .Explain(input, pair, calibration, noise, options, &view, &misfits)) {
+           .Explain(input, pair, calibration, noise, options, times_s, &view, &misfits)) {
     return;
   }
   for (size_t i = 0; i < misfits.size(); ++i) {
@@ -56,13 +59,14 @@ bool AlmostTheSame(const std::vector<int64_t>& moving, const std::vector<int64_t
 std::vector<TrackLean> LeanOfTracks(const EstimationInput& input,
                                     const std::vector<TimedPair>& pairs,
                                     const Calibration& calibration, double noise,
-                                    const PairGraphOptions& options) {
+                                    const PairGraphOptions& options, const PairLatents* latents) {
   constexpr size_t kTogether = 64;  // pairs, whatever the number of threads: sums in one order
   std::vector<TrackLeans> of_parts((pairs.size() + kTogether - 1) / kTogether);
   ParallelFor(of_parts.size(), [&](size_t part) {
     const size_t end = std::min(pairs.size(), (part + 1) * kTogether);
     for (size_t i = part * kTogether; i < end; ++i) {
-      AddLeans(input, pairs[i], calibration, noise, options, &of_parts[part]);
+      const auto times_s = latents != nullptr ? latents->TimesOf(pairs[i]) : std::nullopt;
+      AddLeans(input, pairs[i], calibration, noise, options, times_s, &of_parts[part]);
     }
   });
   TrackLeans leans;
@@ -90,7 +94,8 @@ Result<StillFit> FitWhatIsStill(const EstimationInput& input, const std::vector<
   std::vector<int64_t> left_out;
   for (int test = 0; test < kMostTests; ++test) {
     const std::vector<TrackLean> leans =
-        LeanOfTracks(input, pairs, still.fit.calibration, still.fit.quality.noise_px, options);
+        LeanOfTracks(input, pairs, still.fit.calibration, still.fit.quality.noise_px, options,
+                     still.fit.latents.get());
     std::vector<int64_t> moving = MovingTracks(leans);
     if (AlmostTheSame(moving, left_out, leans)) break;
     std::vector<TimedPair> at_rest = WithoutTracks(pairs, moving);

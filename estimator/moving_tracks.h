@@ -17,10 +17,13 @@ namespace camgyro {
 
 // Of all tracks with kLeastMatches in the pairs, by ascending id; each as if the calibration were
 // right, with the gyro's rates and the direction that suits each pair best. noise: per axis [px].
+// latents: of a fit of these pairs, which knows the frames' own times better than each pair by
+// itself; null: of none.
 std::vector<TrackLean> LeanOfTracks(const EstimationInput& input,
                                     const std::vector<TimedPair>& pairs,
                                     const Calibration& calibration, double noise,
-                                    const PairGraphOptions& options);
+                                    const PairGraphOptions& options,
+                                    const PairLatents* latents = nullptr);
 
 // The pairs without the matches of these tracks (ascending ids).
 std::vector<TimedPair> WithoutTracks(const std::vector<TimedPair>& pairs,

@@ -1,5 +1,7 @@
 #include "estimator/residual_table.h"
 
+#include <optional>
+
 #include "estimator/window/pair_view.h"
 
 namespace camgyro {
@@ -14,7 +16,7 @@ std::vector<MatchResidual> ComputeResiduals(const EstimationInput& input,
   std::vector<MatchMisfit> misfits;
   for (const TimedPair& pair : pairs) {
     if (!ResidualOf(pair, options)
-             .Explain(input, pair, calibration, noise_px, options, &view, &misfits)) {
+             .Explain(input, pair, calibration, noise_px, options, std::nullopt, &view, &misfits)) {
       continue;
     }
     for (size_t i = 0; i < misfits.size(); ++i) {

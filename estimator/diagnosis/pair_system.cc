@@ -69,17 +69,15 @@ bool LinearizePair(const PairResidual& residual, const EstimationInput& input,
                    LinearPair* linear) {
   PairView& view = linear->view;
   const bool has_direction = residual.facts().has_direction;
-  if (has_direction && !times_s) {
-    // At the frames' own times, if they have any.
-    if (!FitPair(input, pair, c, noise, options, &view, &linear->plane)) return false;
-  } else {
-    if (!ViewPair(input, pair, c, noise, options, &view,
-                  times_s.value_or(Eigen::Vector2d::Zero())) ||
-        (!residual.facts().of_attitudes &&
-         static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches)) {
+  if (has_direction) {
+    if (!FitPair(input, pair, c, noise, options, &view, &linear->plane, 0, 1, times_s)) {
       return false;
     }
-    if (has_direction) linear->plane = FitPlane(view);
+  } else if (!ViewPair(input, pair, c, noise, options, &view,
+                       times_s.value_or(Eigen::Vector2d::Zero())) ||
+             (!residual.facts().of_attitudes &&
+              static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches)) {
+    return false;
   }
   auto measurement = std::make_shared<PairMeasurement>(view.measurement);
   measurement->effects = all.set->size() > 0 ? all.set : nullptr;

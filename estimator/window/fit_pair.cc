@@ -169,12 +169,12 @@ TimedPair WithFewMatches(const TimedPair& pair, size_t first, size_t step) {
 
 bool FitPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
              double noise_px, const PairGraphOptions& options, PairView* view, PairPlane* plane,
-             size_t first, size_t step) {
+             size_t first, size_t step, const std::optional<Eigen::Vector2d>& times_s) {
   // Where so many of the matches are right, the times are as well: saves time only.
   constexpr double kSurelyRight = 0.9;
   TimesOfPair fit(input, pair, calibration, noise_px, options, first, step);
-  if (!(calibration.pair_effects().frame_time_spread_s() > 0.0)) {
-    if (!fit.At(Eigen::Vector2d::Zero())) return false;
+  if (times_s || !(calibration.pair_effects().frame_time_spread_s() > 0.0)) {
+    if (!fit.At(times_s.value_or(Eigen::Vector2d::Zero()))) return false;
   } else if (!fit.DescendFrom(Eigen::Vector2d::Zero())) {
     return false;
   } else if (fit.RightShare() < kSurelyRight) {

@@ -34,6 +34,9 @@ struct PairLatents {
   std::map<int64_t, PairPlane> planes;      // by pair
   std::map<int64_t, double> frame_times_s;  // by PairGraph::FrameNumber
   RatesFound rates;
+
+  // Of the two frames; none where one of them has none.
+  std::optional<Eigen::Vector2d> TimesOf(const TimedPair& pair) const;
 };
 
 class PairGraph {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "core/parallel.h"
@@ -149,6 +150,13 @@ PairLatents PairGraph::Latents() const {
   }
   latents.frame_times_s = OwnTimes();
   return latents;
+}
+
+std::optional<Eigen::Vector2d> PairLatents::TimesOf(const TimedPair& pair) const {
+  const auto a = frame_times_s.find(PairGraph::FrameNumber(pair.time_a_s));
+  const auto b = frame_times_s.find(PairGraph::FrameNumber(pair.time_b_s));
+  if (a == frame_times_s.end() || b == frame_times_s.end()) return std::nullopt;
+  return Eigen::Vector2d(a->second, b->second);
 }
 
 std::map<int64_t, double> PairGraph::OwnTimes() const {

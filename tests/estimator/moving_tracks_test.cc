@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <set>
 
+#include "estimator/window/pair_graph.h"
 #include "tests/estimator/simulated_input.h"
 
 namespace camgyro {
@@ -79,6 +81,31 @@ TEST(MovingTracks, AreThoseThatMove) {
         return scene.moving.count(lean.track_id) > 0;
       }));
   EXPECT_GT(right, 0.6 * moves);  // the others go along their epipolar lines
+}
+
+// Stamps that are up to 5 ms off, as a fit knows them: what moves is what moves without that.
+TEST(LeanOfTracks, IsAtTheTimesThatAFitKnows) {
+  simulation::SceneOptions options;
+  options.moving_fraction = 0.3;
+  WalkScene scene = Walk(options, 0.0, 6.0);
+  const std::vector<int64_t> moving = MovingTracks(LeansOf(scene));
+  ASSERT_GT(moving.size(), 20u);
+  Calibration& fit = scene.simulated.truth;
+  fit.effects = std::make_shared<const EffectSet>(
+      MakeEffects("frame_stamp_jitter", MakeEffectSetup(scene.simulated.recording, fit)).value());
+  fit.effect_values = Eigen::VectorXd::Constant(1, 3e-3);
+  const auto late_s = [](int frame) { return 1e-3 * (frame * 7919 % 11 - 5); };
+  PairLatents latents;
+  for (TimedPair& pair : scene.input.pairs) {
+    pair.time_a_s += late_s(pair.frame_a);
+    pair.time_b_s += late_s(pair.frame_b);
+    EXPECT_FALSE(latents.TimesOf(pair));  // of its second frame, it does not know
+    latents.frame_times_s[PairGraph::FrameNumber(pair.time_a_s)] = -late_s(pair.frame_a);
+    latents.frame_times_s[PairGraph::FrameNumber(pair.time_b_s)] = -late_s(pair.frame_b);
+  }
+  EXPECT_EQ(
+      MovingTracks(LeanOfTracks(scene.input, scene.input.pairs, fit, 0.5, scene.options, &latents)),
+      moving);
 }
 
 TEST(FitWhatIsStill, FitsAgainWithoutWhatMoves) {

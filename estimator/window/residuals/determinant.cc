@@ -1,5 +1,7 @@
 // Triplets of matches as in the paper. Whatever looks at single matches takes them as those of
 // planes.
+#include <optional>
+
 #include "estimator/window/direction_search.h"
 #include "estimator/window/residuals/all_residuals.h"
 #include "factors/coplanarity_determinant.h"
@@ -36,9 +38,10 @@ class Determinant final : public PairResidual {
   }
 
   bool Explain(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
-               double noise, const PairGraphOptions& options, PairView* view,
+               double noise, const PairGraphOptions& options,
+               const std::optional<Eigen::Vector2d>& times_s, PairView* view,
                std::vector<MatchMisfit>* misfits) const override {
-    return ByPlane().Explain(input, pair, calibration, noise, options, view, misfits);
+    return ByPlane().Explain(input, pair, calibration, noise, options, times_s, view, misfits);
   }
 
   bool Unseen(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,

@@ -59,7 +59,8 @@ bool PairResidual::HasResidual(const Lens&, const LensParameters&, const Bearing
 }
 
 bool PairResidual::Explain(const EstimationInput&, const TimedPair&, const Calibration&, double,
-                           const PairGraphOptions&, PairView*, std::vector<MatchMisfit>*) const {
+                           const PairGraphOptions&, const std::optional<Eigen::Vector2d>&,
+                           PairView*, std::vector<MatchMisfit>*) const {
   return false;
 }
 

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/calibration.h"
@@ -97,10 +98,12 @@ class PairResidual {
   // A pair under a calibration, outside of any solve, with the gyro's rates and the direction that
   // suits it best. False where the gyro does not cover it, or too few matches have a residual.
   // noise: per axis [px].
-  // Each match; `view` says which these are.
+  // Each match; `view` says which these are. times_s: offsets of the two frames from their stamps,
+  // where something else than the pair tells them (FitPair).
   virtual bool Explain(const EstimationInput& input, const TimedPair& pair,
                        const Calibration& calibration, double noise,
-                       const PairGraphOptions& options, PairView* view,
+                       const PairGraphOptions& options,
+                       const std::optional<Eigen::Vector2d>& times_s, PairView* view,
                        std::vector<MatchMisfit>* misfits) const;
   // Independent residuals of those matches that have had no say in the pair's direction, in sigmas
   // of what noise lets expect, the error of that direction included.

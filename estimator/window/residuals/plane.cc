@@ -1,5 +1,6 @@
 // All matches of a pair against one plane, whose normal is an unknown of the pair.
 #include <cmath>
+#include <optional>
 
 #include "estimator/window/fit_pair.h"
 #include "estimator/window/pair_graph_options.h"
@@ -49,10 +50,13 @@ class Plane final : public PairResidual {
   }
 
   bool Explain(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
-               double noise, const PairGraphOptions& options, PairView* view,
+               double noise, const PairGraphOptions& options,
+               const std::optional<Eigen::Vector2d>& times_s, PairView* view,
                std::vector<MatchMisfit>* misfits) const override {
     PairPlane plane;
-    if (!FitPair(input, pair, calibration, noise, options, view, &plane)) return false;
+    if (!FitPair(input, pair, calibration, noise, options, view, &plane, 0, 1, times_s)) {
+      return false;
+    }
     misfits->clear();
     for (size_t i = 0; i < view->bearings.a.size(); ++i) {
       const double sigmas = ResidualOf(*view, plane, i).value;

@@ -1,5 +1,6 @@
 // Where the rotation alone would move each match: for far scenes.
 #include <cmath>
+#include <optional>
 
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/pair_view.h"
@@ -42,8 +43,8 @@ class ByRotationAlone final : public PairResidual {
   }
 
   bool Explain(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
-               double noise, const PairGraphOptions& options, PairView* view,
-               std::vector<MatchMisfit>* misfits) const override {
+               double noise, const PairGraphOptions& options, const std::optional<Eigen::Vector2d>&,
+               PairView* view, std::vector<MatchMisfit>* misfits) const override {
     std::vector<double> residuals;
     if (!ViewResiduals(input, pair, calibration, noise, options, view, &residuals)) return false;
     const double sigma_of_two_px =

@@ -124,7 +124,8 @@ TEST(AllResiduals, ExplainsAWrongMatch) {
     t.pair.matches.at(4).px_b += Eigen::Vector2d(8.0, 6.0);
     PairView view;
     std::vector<MatchMisfit> misfits;
-    ASSERT_TRUE(residual->Explain(t.input, t.pair, t.truth, 0.5, t.options, &view, &misfits));
+    ASSERT_TRUE(
+        residual->Explain(t.input, t.pair, t.truth, 0.5, t.options, std::nullopt, &view, &misfits));
     ASSERT_EQ(misfits.size(), view.measurement.matches.size());
     std::vector<double> unseen;
     ASSERT_TRUE(residual->Unseen(t.input, t.pair, t.truth, 0.5, t.options, &unseen));
@@ -135,7 +136,8 @@ TEST(AllResiduals, ExplainsAWrongMatch) {
     EXPECT_LT(misfits.at(4).correction_px.dot(Eigen::Vector2d(8.0, 6.0)), 0.0);
     // Too few matches are no pair.
     t.pair.matches.resize(7);
-    EXPECT_FALSE(residual->Explain(t.input, t.pair, t.truth, 0.5, t.options, &view, &misfits));
+    EXPECT_FALSE(
+        residual->Explain(t.input, t.pair, t.truth, 0.5, t.options, std::nullopt, &view, &misfits));
     EXPECT_FALSE(residual->Unseen(t.input, t.pair, t.truth, 0.5, t.options, &unseen));
   }
 }
