@@ -200,7 +200,7 @@ double CostOfPointsBehind(const PairBearings& bearings, double variance_a, doubl
 DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a, double variance_b,
                                 double robust_threshold, size_t first, size_t step) {
   static const std::vector<Vector3d> grid = HalfSphere(120);
-  std::vector<Vector3d> candidates = grid;
+  std::vector<Vector3d> candidates;
   const size_t n = (bearings.a.size() + step - 1 - first) / step;
   const auto normal = [&](size_t i) -> Vector3d {
     return bearings.a[first + step * i].ray_ref.cross(bearings.b[first + step * i].ray_ref);
@@ -211,6 +211,8 @@ DirectionEstimate FindDirection(const PairBearings& bearings, double variance_a,
     const Vector3d tau = normal(i).cross(normal(j));
     if (tau.norm() > 1e-14) candidates.push_back(tau.normalized());
   }
+  // After those: beside them, most of these have lost after a few matches.
+  candidates.insert(candidates.end(), grid.begin(), grid.end());
   // Some 60 matches rank the candidates well enough; the refinement uses them all.
   const size_t stride = std::max<size_t>(1, n / 60);
   const std::vector<TwoMatches> all = Prepare(bearings, variance_a, variance_b, first, step),
