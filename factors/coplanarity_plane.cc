@@ -12,23 +12,47 @@ namespace {
 
 bool IsWanted(const double* jacobian) { return jacobian != nullptr; }
 
+// The numerator e = tau . (a x b) is linear in each ray: e = a . m_a = b . m_b.
+struct Numerator {
+  Numerator(const Eigen::Vector3d& a, const Eigen::Matrix<double, 3, 2>& A,
+            const Eigen::Vector3d& b, const Eigen::Matrix<double, 3, 2>& B,
+            const Eigen::Vector3d& tau)
+      : m_a(b.cross(tau)),
+        m_b(tau.cross(a)),
+        n(a.cross(b)),
+        e_px_a(A.transpose() * m_a),
+        e_px_b(B.transpose() * m_b) {}
+
+  double InverseSigma(double variance_a, double variance_b) const {
+    // A match on the epipole in both images says nothing; the floor keeps it at zero residual.
+    return 1.0 /
+           std::sqrt(variance_a * e_px_a.squaredNorm() + variance_b * e_px_b.squaredNorm() + 1e-30);
+  }
+
+  Eigen::Vector3d m_a, m_b, n;
+  Eigen::Vector2d e_px_a, e_px_b;
+};
+
 }  // namespace
+
+double PlaneResidualValue(const Eigen::Vector3d& a, const Eigen::Matrix<double, 3, 2>& A,
+                          const Eigen::Vector3d& b, const Eigen::Matrix<double, 3, 2>& B,
+                          const Eigen::Vector3d& tau, double variance_a, double variance_b) {
+  const Numerator e(a, A, b, B, tau);
+  return tau.dot(e.n) * e.InverseSigma(variance_a, variance_b);
+}
 
 PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matrix<double, 3, 2>& A,
                                     const Eigen::Vector3d& b, const Eigen::Matrix<double, 3, 2>& B,
                                     const Eigen::Vector3d& tau, double variance_a,
                                     double variance_b) {
-  // The numerator e = tau . (a x b) is linear in each ray: e = a . m_a = b . m_b.
-  const Eigen::Vector3d m_a = b.cross(tau), m_b = tau.cross(a), n = a.cross(b);
-  const double e = tau.dot(n);
-  const Eigen::Vector2d e_px_a = A.transpose() * m_a, e_px_b = B.transpose() * m_b;
-  // A match on the epipole in both images says nothing; the floor keeps it at zero residual.
-  const double variance =
-      variance_a * e_px_a.squaredNorm() + variance_b * e_px_b.squaredNorm() + 1e-30;
-  const double inv_sigma = 1.0 / std::sqrt(variance);
+  const Numerator e(a, A, b, B, tau);
+  const Eigen::Vector3d &m_a = e.m_a, &m_b = e.m_b, &n = e.n;
+  const Eigen::Vector2d &e_px_a = e.e_px_a, &e_px_b = e.e_px_b;
+  const double inv_sigma = e.InverseSigma(variance_a, variance_b);
 
   PlaneResidual r;
-  r.value = e * inv_sigma;
+  r.value = tau.dot(n) * inv_sigma;
   // dr = de / sigma - (e / sigma^3) d(sigma^2 / 2)
   const double k = r.value * inv_sigma * inv_sigma;
   const Eigen::Vector3d q_a = variance_a * (A * e_px_a), q_b = variance_b * (B * e_px_b);
@@ -77,12 +101,17 @@ bool CoplanarityPlane::Evaluate(double const* const* parameters, double* residua
   for (size_t i = 0; i < pair.matches.size(); ++i) {
     if (!bearings.Evaluate(i, jacobians != nullptr, &a, &b)) return false;
     const Eigen::Vector2d shares = BendShares(pair, pair.matches[i]);
-    const PlaneResidual r =
-        EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, tau + bend * shares,
-                              pair.variance_a(), pair.variance_b());
+    const Eigen::Vector3d direction = tau + bend * shares;
+    if (jacobians == nullptr) {
+      const double value = PlaneResidualValue(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
+                                              direction, pair.variance_a(), pair.variance_b());
+      residuals[i] = Robustify(value, pair.robust_threshold).value;
+      continue;
+    }
+    const PlaneResidual r = EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
+                                                  direction, pair.variance_a(), pair.variance_b());
     const RobustResidual robust = Robustify(r.value, pair.robust_threshold);
     residuals[i] = robust.value;
-    if (jacobians == nullptr) continue;
     if (whole_row) {
       row.Clear();
       row.Add(a, chain, pair.size_px.y(), r.by_a, r.by_J_a);

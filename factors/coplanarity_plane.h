@@ -24,6 +24,10 @@ PlaneResidual EvaluatePlaneResidual(const Eigen::Vector3d& a, const Eigen::Matri
                                     const Eigen::Vector3d& b, const Eigen::Matrix<double, 3, 2>& B,
                                     const Eigen::Vector3d& tau, double variance_a,
                                     double variance_b);
+// Its value alone.
+double PlaneResidualValue(const Eigen::Vector3d& a, const Eigen::Matrix<double, 3, 2>& A,
+                          const Eigen::Vector3d& b, const Eigen::Matrix<double, 3, 2>& B,
+                          const Eigen::Vector3d& tau, double variance_a, double variance_b);
 
 // Turn and bow of a pair's translation direction (or their standard deviations); see below.
 using BendVector = Eigen::Matrix<double, 6, 1>;

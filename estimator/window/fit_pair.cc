@@ -129,7 +129,7 @@ class TimesOfPair {
     const size_t n = view.bearings.a.size();
     size_t right = 0, all = 0;
     for (size_t i = first_; i < n; i += step_, ++all) {
-      right += std::abs(ResidualOf(view, plane, i).value) <= options_.inlier_sigmas();
+      right += std::abs(ValueOf(view, plane, i)) <= options_.inlier_sigmas();
     }
     return static_cast<double>(right) / static_cast<double>(all);
   }

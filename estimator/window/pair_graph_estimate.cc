@@ -88,7 +88,7 @@ CrossFit PairGraph::CrossFitOf(int64_t id, PairBearings* bearings) {
     const PairPlane plane = FitPlane(view, half, 2);
     fit.expected += fit.own / n * DegreesOfFreedom(view, plane, half, 2);
     for (size_t i = 1 - half; i < own.size(); i += 2) {
-      fit.unseen += bounded_sq(ResidualOf(view, plane, i).value);
+      fit.unseen += bounded_sq(ValueOf(view, plane, i));
     }
   }
   return fit;

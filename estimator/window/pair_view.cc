@@ -68,6 +68,13 @@ PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i)
                                plane.DirectionOf(m, i), m.variance_a(), m.variance_b());
 }
 
+double ValueOf(const PairView& view, const PairPlane& plane, size_t i) {
+  const PairMeasurement& m = view.measurement;
+  const Bearing &a = view.bearings.a[i], &b = view.bearings.b[i];
+  return PlaneResidualValue(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px, plane.DirectionOf(m, i),
+                            m.variance_a(), m.variance_b());
+}
+
 Eigen::Vector2d CorrectionOf(const PairView& view, const PairPlane& plane, size_t i) {
   const Bearing &a = view.bearings.a[i], &b = view.bearings.b[i];
   const Eigen::Vector3d tau = plane.DirectionOf(view.measurement, i);

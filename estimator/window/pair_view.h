@@ -53,6 +53,7 @@ double DegreesOfFreedom(const PairView& view, const PairPlane& plane, size_t fir
 std::vector<double> PredictedResiduals(const PairView& view, const PairPlane& of_even);
 // Of match i, in sigmas, without loss.
 PlaneResidual ResidualOf(const PairView& view, const PairPlane& plane, size_t i);
+double ValueOf(const PairView& view, const PairPlane& plane, size_t i);  // alone
 
 // The shortest shift of px_b that takes match i onto the plane; see MatchMisfit.
 Eigen::Vector2d CorrectionOf(const PairView& view, const PairPlane& plane, size_t i);

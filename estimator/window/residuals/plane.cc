@@ -41,10 +41,9 @@ class Plane final : public PairResidual {
                           Eigen::Map<const BendVector>(at.bend)};
     for (size_t i = 0; i < m.matches.size(); ++i) {
       const Bearing &a = bearings->a[i], &b = bearings->b[i];
-      residuals.push_back(EvaluatePlaneResidual(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
-                                                plane.DirectionOf(m, i), m.variance_a(),
-                                                m.variance_b())
-                              .value);
+      residuals.push_back(PlaneResidualValue(a.ray_ref, a.J_ray_px, b.ray_ref, b.J_ray_px,
+                                             plane.DirectionOf(m, i), m.variance_a(),
+                                             m.variance_b()));
     }
     return residuals;
   }
@@ -59,7 +58,7 @@ class Plane final : public PairResidual {
     }
     misfits->clear();
     for (size_t i = 0; i < view->bearings.a.size(); ++i) {
-      const double sigmas = ResidualOf(*view, plane, i).value;
+      const double sigmas = ValueOf(*view, plane, i);
       MatchMisfit misfit;
       misfit.residual_px = sigmas * view->measurement.sigma;
       misfit.inlier = std::abs(sigmas) <= options.inlier_sigmas();
