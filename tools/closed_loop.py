@@ -61,7 +61,7 @@ def number(value):
 def before_after(rounds, key, scale=1.0):
     """First and last value in frames that neither fit nor choice has seen, with each round's own
     noise: before the first effect, after the last."""
-    added = [r for r in rounds if r["added"] != "none"]
+    added = [r for r in rounds if r["added"] != "none" and "withdrawn" not in r]
     if not added:
         return "%s" % number(scale * rounds[-1][key]["before"]) if rounds else ""
     return " → ".join([number(scale * added[0][key]["before"])] +
@@ -76,6 +76,7 @@ def row(result):
     said = []
     if verdict.get("unconfirmed"):
         said.append("not confirmed: " + ", ".join(verdict["unconfirmed"]))
+    said += ["withdrawn: " + r["added"] for r in d["rounds"] if "withdrawn" in r]
     if verdict["unexplained_structure"]:
         said.append("structure is left: " + ", ".join(verdict["where"]))
     said += ["%s: %s" % (f["name"], f["finding"]) for f in d["faults"]]
@@ -89,7 +90,7 @@ def row(result):
     rounds = d["rounds"]
     scale = 1e3 if result["name"].startswith(OF_ATTITUDES) else 1.0
     gains = ", ".join("%.0f ± %.0f" % (r["unseen_gain"]["value"], r["unseen_gain"]["sigma"])
-                      for r in rounds if r["added"] != "none")
+                      for r in rounds if r["added"] != "none" and "withdrawn" not in r)
     return [result["name"], str(result["exit"]), ", ".join(verdict["effects"]) or "none",
             before_after(rounds, "unseen_rms_px", scale), before_after(rounds, "unseen_chi2"),
             gains, "; ".join(said) or "nothing left"]

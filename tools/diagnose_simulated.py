@@ -147,6 +147,7 @@ def run(options, case):
                 if case["kind"] == "clean":
                     result["p_values"] = {c["name"]: c["p_value"]
                                           for c in rounds[0]["candidates"]}
+            rounds = [r for r in rounds if "withdrawn" not in r]
             result["added"] = [r["added"] for r in rounds if r["added"] != "none"]
             for r in rounds:
                 if r["added"] != "none":

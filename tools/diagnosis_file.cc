@@ -59,6 +59,7 @@ void EmitRound(YAML::Emitter& out, const DiagnosisRound& round) {
   out << YAML::EndSeq;
   Emit(out, "added", round.added.empty() ? "none" : round.added);
   if (!round.added.empty()) Emit(out, "shape", round.shape);
+  if (!round.withdrawn.empty()) Emit(out, "withdrawn", round.withdrawn);
   EmitBeforeAfter(out, "unseen_rms_px", round.before.rms_px, round.after.rms_px);
   EmitBeforeAfter(out, "unseen_chi2", round.before.chi2, round.after.chi2);
   out << YAML::Key << "unseen_gain" << YAML::Value << YAML::Flow << YAML::BeginMap;
@@ -130,6 +131,7 @@ std::string RoundText(size_t number, const DiagnosisRound& round, const char* un
     }
   }
   if (!rivals.empty()) text += "     rivals, refitted: " + rivals + "\n";
+  if (!round.withdrawn.empty()) return text + "     withdrawn: " + round.withdrawn + "\n";
   return text + "     what to do: " + FindEffect(c.name)->advice + "\n";
 }
 

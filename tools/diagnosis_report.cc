@@ -61,12 +61,14 @@ ReportSection VerdictSection(const Diagnosis& d, bool attitudes) {
     const CandidateResult& c = round.candidates.front();
     rounds.rows.push_back(
         Row({Format("%zu", i + 1),
-             c.name + " (" + c.shape + "): " + FindEffect(c.name)->explanation, ValuesText(c),
+             c.name + " (" + c.shape + "): " + FindEffect(c.name)->explanation +
+                 (round.withdrawn.empty() ? "" : "; withdrawn: " + round.withdrawn),
+             ValuesText(c),
              c.tried_anyway ? "without it, the model is far off" : Format("%.2g", c.p_value),
              Format("%.3f → %.3f", scale * round.before.rms_px, scale * round.after.rms_px),
              Format("%.3f → %.3f", round.before.chi2, round.after.chi2),
              Format("%.0f ± %.0f", round.report_gain.sum, round.report_gain.sigma),
-             FindEffect(c.name)->advice}));
+             round.withdrawn.empty() ? FindEffect(c.name)->advice : ""}));
   }
   if (!d.rounds.empty()) {
     html +=

@@ -1,6 +1,8 @@
 #include "estimator/diagnosis/diagnose.h"
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "core/format.h"
@@ -112,11 +114,49 @@ void CalibrateWith(const Calibration& found, const LoopInput& input,
   }
 }
 
+// Without the effects of rounds that are withdrawn.
+Calibration WithoutWithdrawn(const Calibration& found, const std::vector<DiagnosisRound>& rounds) {
+  Calibration without = found;
+  auto set = std::make_shared<EffectSet>();
+  std::vector<double> values;
+  for (const EffectSet::Item& item : found.effects->items()) {
+    if (std::any_of(rounds.begin(), rounds.end(), [&](const DiagnosisRound& round) {
+          return !round.withdrawn.empty() && round.added == item.entry->name &&
+                 round.shape == item.shape;
+        })) {
+      continue;
+    }
+    set->Add(item);
+    for (int k = 0; k < item.effect->size(); ++k) {
+      values.push_back(found.effect_values[item.first + k]);
+    }
+  }
+  without.effect_values =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  without.effect_covariance.resize(0, 0);
+  without.effects = set->empty() ? nullptr : std::move(set);
+  return without;
+}
+
+void NameAllButWithdrawn(Diagnosis* diagnosis) {
+  std::vector<std::string>& names = diagnosis->effects;
+  for (const DiagnosisRound& round : diagnosis->rounds) {
+    if (round.withdrawn.empty()) continue;
+    names.erase(std::remove(names.begin(), names.end(), round.added), names.end());
+  }
+}
+
+bool AddsAnEffect(const Diagnosis& diagnosis) {
+  return std::any_of(
+      diagnosis.rounds.begin(), diagnosis.rounds.end(),
+      [](const DiagnosisRound& round) { return !round.added.empty() && round.withdrawn.empty(); });
+}
+
 // The result has them all the same: what chose them has four times the frames.
 void DoubtWhatIsNotConfirmed(Diagnosis* diagnosis) {
   if (!diagnosis->after) return;
   for (const DiagnosisRound& round : diagnosis->rounds) {
-    if (!IsUnconfirmed(round)) continue;
+    if (!IsUnconfirmed(round) || !round.withdrawn.empty()) continue;
     diagnosis->after->doubts.push_back(
         round.added +
         Format(" is not confirmed by frames that neither fit nor choice has seen (chi2 falls by "
@@ -187,6 +227,15 @@ Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOpti
   AddReversedReadout(&diagnosis);
   if (found->effects && found->effects != report.calibration.effects) {
     CalibrateWith(*found, input, rotations_at, options, progress, &diagnosis);
+    if (diagnosis.after && WithdrawByAllFrames(diagnosis.after->calibration, options.significance,
+                                               &diagnosis.rounds)) {
+      NameAllButWithdrawn(&diagnosis);
+      diagnosis.after.reset();
+      if (AddsAnEffect(diagnosis)) {
+        CalibrateWith(WithoutWithdrawn(*found, diagnosis.rounds), input, rotations_at, options,
+                      progress, &diagnosis);
+      }
+    }
     DoubtWhatIsNotConfirmed(&diagnosis);
     clock.Finish("refinement with effects");
   }

@@ -62,6 +62,7 @@ struct ReportShare {
 struct DiagnosisRound {
   std::vector<CandidateResult> candidates;         // best first
   std::string added, shape;                        // empty: nothing
+  std::string withdrawn;                           // why not, after all; empty: it stays
   ReportShare before, after;                       // alike if nothing was added
   Gain report_gain;                                // fall of chi2 in the report share
   double expected_gain = 0.0;                      // there, if the fit with the effect is right

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/format.h"
+#include "core/linear_algebra.h"
+#include "estimator/diagnosis/score_test.h"
 #include "estimator/diagnosis/thresholds.h"
 
 namespace camgyro {
@@ -61,9 +64,33 @@ bool IsUnconfirmed(const DiagnosisRound& round) {
 std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds) {
   std::vector<std::string> names;
   for (const DiagnosisRound& round : rounds) {
-    if (IsUnconfirmed(round)) names.push_back(round.added);
+    if (IsUnconfirmed(round) && round.withdrawn.empty()) names.push_back(round.added);
   }
   return names;
+}
+
+bool WithdrawByAllFrames(const Calibration& of_all_frames, double significance,
+                         std::vector<DiagnosisRound>* rounds) {
+  if (of_all_frames.effects == nullptr) return false;
+  bool any = false;
+  for (DiagnosisRound& round : *rounds) {
+    if (!IsUnconfirmed(round)) continue;
+    for (const EffectSet::Item& item : of_all_frames.effects->items()) {
+      const int n = item.effect->size();
+      if (item.entry->name != round.added || item.shape != round.shape || n == 0) continue;
+      const double chi2 =
+          SquaredMahalanobis(of_all_frames.effect_values.segment(item.first, n),
+                             of_all_frames.effect_covariance.block(item.first, item.first, n, n));
+      const double p = ChiSquareTail(chi2, n);
+      if (!(p > significance)) continue;
+      round.withdrawn = Format(
+          "unseen frames do not confirm it, and the fit of all frames does not bear it out "
+          "(p = %.2g)",
+          p);
+      any = true;
+    }
+  }
+  return any;
 }
 
 }  // namespace camgyro

@@ -41,8 +41,14 @@ bool ShowsGain(const DiagnosisRound& round);
 // or stand for something else, which the other frames have and these have not.
 bool IsUnconfirmed(const DiagnosisRound& round);
 
-// The effects of such rounds, in their order.
+// The effects of such rounds that are not withdrawn, in their order.
 std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds);
+
+// One of the candidates of many recordings is significant by chance. If frames that had no part in
+// the choice do not confirm an effect, and its parameters in the fit of all frames are not
+// significant either, it is no finding: fills `withdrawn` of such rounds. True if there are any.
+bool WithdrawByAllFrames(const Calibration& of_all_frames, double significance,
+                         std::vector<DiagnosisRound>* rounds);
 
 }  // namespace camgyro
 

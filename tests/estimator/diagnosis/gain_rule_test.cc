@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <memory>
+
 namespace camgyro {
 namespace {
 
@@ -69,6 +71,40 @@ TEST(GainRule, AnEffectThatGainsNothingWhereItWouldShowIsUnconfirmed) {
       Unconfirmed({round("clock_skew", 1.0, 2.0, 15.0), round("gyro_scale", 9.0, 10.0, 17.0),
                    round("delay_wander", -14.0, 5.0, 40.0), round("", 0.0, 0.0, 0.0)}),
       testing::ElementsAre("gyro_scale", "delay_wander"));
+}
+
+// By chance significant in the shares that chose it, and 1.8 sigmas in the fit of all frames.
+TEST(GainRule, WhatAllFramesDoNotBearOutIsWithdrawn) {
+  Calibration all_frames;
+  EffectSetup setup;
+  setup.frames = {FrameTime{0.0}, FrameTime{14.0}};
+  all_frames.effects = std::make_shared<const EffectSet>(
+      MakeEffects("focal_drift:linear,gyro_scale", setup).value());
+  const EffectSet::Item &drift = all_frames.effects->items()[0],
+                        &scale = all_frames.effects->items()[1];
+  ASSERT_EQ(drift.entry->name, "focal_drift");
+  all_frames.effect_values = Eigen::Vector4d(-0.067, 0.002, 0.002, 0.002);
+  all_frames.effect_covariance = 1e-6 * Eigen::Matrix4d::Identity();
+  all_frames.effect_covariance(0, 0) = 0.038 * 0.038;
+  const auto round = [](const EffectSet::Item& item, double gain) {
+    DiagnosisRound r;
+    r.added = item.entry->name;
+    r.shape = item.shape;
+    r.report_gain.sum = gain;
+    r.report_gain.sigma = 12.0;
+    r.expected_gain = 21.0;
+    return r;
+  };
+  std::vector<DiagnosisRound> rounds = {round(drift, -21.0)};
+  EXPECT_FALSE(WithdrawByAllFrames(all_frames, 0.08, &rounds));  // p = 0.078
+  EXPECT_THAT(Unconfirmed(rounds), testing::ElementsAre("focal_drift"));
+  // Three parameters of two sigmas each: p = 0.0074.
+  rounds = {round(drift, -21.0), round(scale, -21.0), round(drift, 20.0)};
+  EXPECT_TRUE(WithdrawByAllFrames(all_frames, 0.01, &rounds));
+  EXPECT_THAT(rounds[0].withdrawn, testing::HasSubstr("p = 0.078"));
+  EXPECT_EQ(rounds[1].withdrawn, "");
+  EXPECT_EQ(rounds[2].withdrawn, "");  // confirmed
+  EXPECT_THAT(Unconfirmed(rounds), testing::ElementsAre("gyro_scale"));
 }
 
 // 3 px of the focal length, and an effect of 0.02, by what two blocks know of both.
