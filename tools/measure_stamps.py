@@ -226,6 +226,7 @@ def main():
         case for seed in range(int(first), int(last) + 1) for motion in options.motions.split(",")
         for size in options.sizes.split(";") if (case := (size, motion, seed)) not in rows]
     commit = commit_of_sources()
+    os.makedirs(os.path.dirname(os.path.abspath(options.store)), exist_ok=True)
     with ThreadPoolExecutor(options.jobs) as pool:
         for done in as_completed([pool.submit(run, options, case) for case in cases]):
             row = dict(done.result(), commit=commit)
