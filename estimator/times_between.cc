@@ -47,8 +47,8 @@ std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Cali
                                           const std::vector<FrameOffset>& of_pairs, double noise_px,
                                           const PairGraphOptions& graph) {
   // The calibration and the times of the frames in pairs are known; what is left are directions and
-  // times.
-  constexpr int kRounds = 3;
+  // times: a third round moves them no nearer to the camera's clock (docs/lab/performance.md).
+  constexpr int kRounds = 2;
   if (of_pairs.empty() || !SelectPairs(recording).leaves_frames_out()) return of_pairs;
 
   const EstimationInput input = OutlineOf(recording, PairSelection());
