@@ -40,5 +40,36 @@ TEST(Diagnose, WithoutAnEffectFramesInBetweenHaveTimesAsWell) {
   }
 }
 
+// A recording in which nothing is wrong, as number 234 of tools/diagnose_simulated.py --clean
+// 1-600: an effect is significant by chance (p = 0.0006 of 25 candidates).
+TEST(Diagnose, WithdrawsWhatAllFramesDoNotBearOut) {
+  simulation::Scenario scenario;
+  scenario.motion = simulation::MotionPreset(simulation::MotionKind::kWalking);
+  scenario.seed = 1234;
+  scenario.duration_s = 14.0;
+  scenario.tracks.noise_px = 0.2;
+  scenario.tracks.outlier_fraction = 0.05;
+  scenario.camera.exposure_swing = 0.5;
+  const auto simulated = simulation::SimulateTracks(scenario);
+  ASSERT_TRUE(simulated);
+  DiagnoseOptions options;
+  options.significance = 0.02;
+  options.calibrate.given_start.emplace();
+  options.calibrate.given_start->delay_middle_row_s = simulated->truth.delay_s + 0.01;
+  options.calibrate.given_start->q_gyro_cam = simulated->truth.q_gyro_cam;
+  Recording recording = simulated->recording;
+  recording.camera.focal_px = 1.02 * simulated->truth.lens[kFocal];
+
+  const Diagnosis diagnosis = Diagnose(nullptr, options, &recording);
+  ASSERT_TRUE(diagnosis.before);
+  ASSERT_FALSE(diagnosis.rounds.empty());
+  EXPECT_EQ(diagnosis.rounds[0].added, "focal_drift");
+  EXPECT_NE(diagnosis.rounds[0].withdrawn, "");
+  EXPECT_TRUE(diagnosis.effects.empty());
+  EXPECT_FALSE(diagnosis.after);
+  EXPECT_EQ(diagnosis.result().calibration.effects, nullptr);
+  EXPECT_TRUE(diagnosis.result().doubts.empty()) << diagnosis.result().doubts[0];
+}
+
 }  // namespace
 }  // namespace camgyro
