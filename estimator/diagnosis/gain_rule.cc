@@ -74,7 +74,7 @@ bool WithdrawByAllFrames(const Calibration& of_all_frames, double significance,
   if (of_all_frames.effects == nullptr) return false;
   bool any = false;
   for (DiagnosisRound& round : *rounds) {
-    if (!IsUnconfirmed(round)) continue;
+    if (round.added.empty() || ShowsGain(round)) continue;
     for (const EffectSet::Item& item : of_all_frames.effects->items()) {
       const int n = item.effect->size();
       if (item.entry->name != round.added || item.shape != round.shape || n == 0) continue;
@@ -84,7 +84,7 @@ bool WithdrawByAllFrames(const Calibration& of_all_frames, double significance,
       const double p = ChiSquareTail(chi2, n);
       if (!(p > significance)) continue;
       round.withdrawn = Format(
-          "unseen frames do not confirm it, and the fit of all frames does not bear it out "
+          "unseen frames do not show it, and the fit of all frames does not bear it out "
           "(p = %.2g)",
           p);
       any = true;

@@ -45,8 +45,9 @@ bool IsUnconfirmed(const DiagnosisRound& round);
 std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds);
 
 // One of the candidates of many recordings is significant by chance. If frames that had no part in
-// the choice do not confirm an effect, and its parameters in the fit of all frames are not
-// significant either, it is no finding: fills `withdrawn` of such rounds. True if there are any.
+// the choice do not show an effect, whether they could or not, and its parameters in the fit of all
+// frames are not significant either, it is no finding: fills `withdrawn` of such rounds. True if
+// there are any.
 bool WithdrawByAllFrames(const Calibration& of_all_frames, double significance,
                          std::vector<DiagnosisRound>* rounds);
 
