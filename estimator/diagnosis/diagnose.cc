@@ -227,8 +227,8 @@ Diagnosis DiagnoseFits(const CameraRotationsAt& rotations_at, const DiagnoseOpti
   AddReversedReadout(&diagnosis);
   if (found->effects && found->effects != report.calibration.effects) {
     CalibrateWith(*found, input, rotations_at, options, progress, &diagnosis);
-    if (diagnosis.after && WithdrawByAllFrames(diagnosis.after->calibration, options.significance,
-                                               &diagnosis.rounds)) {
+    while (diagnosis.after && WithdrawByAllFrames(diagnosis.after->calibration,
+                                                  options.significance, &diagnosis.rounds)) {
       NameAllButWithdrawn(&diagnosis);
       diagnosis.after.reset();
       if (AddsAnEffect(diagnosis)) {

@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/gain_rule.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -72,25 +73,36 @@ std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds) 
 bool WithdrawByAllFrames(const Calibration& of_all_frames, double significance,
                          std::vector<DiagnosisRound>* rounds) {
   if (of_all_frames.effects == nullptr) return false;
-  bool any = false;
-  for (DiagnosisRound& round : *rounds) {
-    if (round.added.empty() || ShowsGain(round)) continue;
+  std::string least;
+  double least_p = significance;
+  for (const DiagnosisRound& round : *rounds) {
+    if (round.added.empty() || !round.withdrawn.empty()) continue;
+    std::vector<Eigen::Index> at;  // of all its shapes
     for (const EffectSet::Item& item : of_all_frames.effects->items()) {
-      const int n = item.effect->size();
-      if (item.entry->name != round.added || item.shape != round.shape || n == 0) continue;
-      const double chi2 =
-          SquaredMahalanobis(of_all_frames.effect_values.segment(item.first, n),
-                             of_all_frames.effect_covariance.block(item.first, item.first, n, n));
-      const double p = ChiSquareTail(chi2, n);
-      if (!(p > significance)) continue;
-      round.withdrawn = Format(
-          "unseen frames do not show it, and the fit of all frames does not bear it out "
-          "(p = %.2g)",
-          p);
-      any = true;
+      if (item.entry->name != round.added) continue;
+      for (int k = 0; k < item.effect->size(); ++k) at.push_back(item.first + k);
+    }
+    if (at.empty() || std::any_of(rounds->begin(), rounds->end(), [&](const DiagnosisRound& other) {
+          return other.added == round.added && ShowsGain(other);
+        })) {
+      continue;
+    }
+    const double p = ChiSquareTail(SquaredMahalanobis(of_all_frames.effect_values(at),
+                                                      of_all_frames.effect_covariance(at, at)),
+                                   static_cast<double>(at.size()));
+    if (p > least_p) {
+      least_p = p;
+      least = round.added;
     }
   }
-  return any;
+  if (least.empty()) return false;
+  for (DiagnosisRound& round : *rounds) {
+    if (round.added != least) continue;
+    round.withdrawn = Format(
+        "unseen frames do not show it, and the fit of all frames does not bear it out (p = %.2g)",
+        least_p);
+  }
+  return true;
 }
 
 }  // namespace camgyro

@@ -46,8 +46,9 @@ std::vector<std::string> Unconfirmed(const std::vector<DiagnosisRound>& rounds);
 
 // One of the candidates of many recordings is significant by chance. If frames that had no part in
 // the choice do not show an effect, whether they could or not, and its parameters in the fit of all
-// frames are not significant either, it is no finding: fills `withdrawn` of such rounds. True if
-// there are any.
+// frames are not significant either, all its shapes together, it is no finding. Fills `withdrawn`
+// of the rounds of the least significant one: what is left of two that stand for the same thing is
+// told by the fit without it. False if there is none.
 bool WithdrawByAllFrames(const Calibration& of_all_frames, double significance,
                          std::vector<DiagnosisRound>* rounds);
 
