@@ -56,6 +56,7 @@ class RotationChain {
   int num_values() const { return value_of_.back() + 1; }
   const std::vector<double>& times_s() const { return times_s_; }
 
+  // The second writes where the state is kept, which saves a copy of it for each bearing.
   State At(double time_s) const {
     State state;
     At(time_s, &state);
