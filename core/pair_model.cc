@@ -65,23 +65,25 @@ Eigen::Vector3d TrueRate(const PairEffects& effects, double time_gyro_s,
   return rate;
 }
 
-bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
-                     const ShutterParameters& shutter, const Eigen::Matrix3d& R_gyro_cam,
-                     const RotationChain& chain, const FrameTime& frame,
-                     const Eigen::Vector2d& size_px, const Eigen::Vector2d& px,
-                     const PairEffects& effects, Bearing* b, LensDerivatives by_lens) {
+namespace {
+
+// The part of a bearing that lens, shutter and effects make; time_s: of exposure.
+bool ExposePixel(const Lens& lens_model, const LensParameters& lens,
+                 const ShutterParameters& shutter, const FrameTime& frame,
+                 const Eigen::Vector2d& size_px, const Eigen::Vector2d& px,
+                 const PairEffects& effects, LensDerivatives by_lens, Bearing* b, double* time_s) {
   const double height_px = size_px.y();
   b->row_fraction = px.y() / height_px;
   b->J_time_px << 0.0, shutter[kReadout] / height_px;
   LensParameters lens_here = lens;
-  double time_s = RowTimeGyroS(frame.stamp_s + frame.offset_s, shutter, px.y(), height_px);
+  *time_s = RowTimeGyroS(frame.stamp_s + frame.offset_s, shutter, px.y(), height_px);
   if (effects.set != nullptr) {
     effects.set->ChangeObservation({px, size_px, frame}, &b->change);
     const Eigen::Map<const Eigen::VectorXd> values(effects.values, effects.set->size());
     // Few columns: lazy products do without the set-up of large ones.
     lens_here += b->change.lens.lazyProduct(values);
     const Eigen::Vector3d change = b->change.time.lazyProduct(values);
-    time_s += change[0];
+    *time_s += change[0];
     b->J_time_px += change.tail<2>().transpose();
   }
   if (!lens_model.Unproject(px, lens_here, &b->lens_ray, by_lens)) return false;
@@ -92,6 +94,12 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
           b->lens_ray.J_ray_lens * (b->change.lens_slope[static_cast<size_t>(k)] * values);
     }
   }
+  return true;
+}
+
+// The rest of it, which the camera's motion makes.
+void Turn(double time_s, const Eigen::Matrix3d& R_gyro_cam, const RotationChain& chain,
+          Bearing* b) {
   chain.At(time_s, &b->rotation);
   b->R_ref_cam = b->rotation.R_ref_gyro * R_gyro_cam;
   b->omega_cam_rad_s = R_gyro_cam.transpose() * b->rotation.omega_gyro_rad_s;
@@ -101,7 +109,45 @@ bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
       b->lens_ray.J_ray_px + b->omega_cam_rad_s.cross(b->lens_ray.ray) * b->J_time_px;
   b->J_ray_px = b->R_ref_cam * J_cam;
   b->noise_factor.setIdentity();
+}
+
+}  // namespace
+
+bool EvaluateBearing(const Lens& lens_model, const LensParameters& lens,
+                     const ShutterParameters& shutter, const Eigen::Matrix3d& R_gyro_cam,
+                     const RotationChain& chain, const FrameTime& frame,
+                     const Eigen::Vector2d& size_px, const Eigen::Vector2d& px,
+                     const PairEffects& effects, Bearing* b, LensDerivatives by_lens) {
+  double time_s = 0.0;
+  if (!ExposePixel(lens_model, lens, shutter, frame, size_px, px, effects, by_lens, b, &time_s)) {
+    return false;
+  }
+  Turn(time_s, R_gyro_cam, chain, b);
   return true;
+}
+
+bool EvaluateTimedRay(const Lens& lens_model, const LensParameters& lens,
+                      const ShutterParameters& shutter, const FrameTime& frame,
+                      const Eigen::Vector2d& size_px, const Eigen::Vector2d& px,
+                      const PairEffects& effects, TimedRay* timed) {
+  Bearing b;
+  if (!ExposePixel(lens_model, lens, shutter, frame, size_px, px, effects, LensDerivatives::kNone,
+                   &b, &timed->time_gyro_s)) {
+    return false;
+  }
+  timed->ray = b.lens_ray.ray;
+  timed->J_ray_px = b.lens_ray.J_ray_px;
+  timed->J_time_px = b.J_time_px;
+  return true;
+}
+
+void TurnRay(const TimedRay& timed, double later_s, const Eigen::Matrix3d& R_gyro_cam,
+             const RotationChain& chain, Bearing* b) {
+  b->lens_ray.ray = timed.ray;
+  b->lens_ray.J_ray_px = timed.J_ray_px;
+  b->lens_ray.num_lens = 0;
+  b->J_time_px = timed.J_time_px;
+  Turn(timed.time_gyro_s + later_s, R_gyro_cam, chain, b);
 }
 
 void Bearing::ScaleNoise(const Eigen::Vector3d& factor) {

@@ -111,6 +111,26 @@ struct PairGradient {
                          Eigen::Vector2d(0.0, height_px), px, PairEffects(), bearing, by_lens);
 }
 
+// A pixel before the camera's motion: where it looks, and when. Lens, shutter and effects make it,
+// so that it is the same wherever these are known.
+struct TimedRay {
+  Eigen::Vector3d ray;                   // camera frame
+  Eigen::Matrix<double, 3, 2> J_ray_px;  // through the lens
+  double time_gyro_s = 0.0;              // of exposure
+  Eigen::RowVector2d J_time_px;          // [s/px]
+};
+
+// False where the lens has no ray for this pixel.
+[[nodiscard]] bool EvaluateTimedRay(const Lens& lens_model, const LensParameters& lens,
+                                    const ShutterParameters& shutter, const FrameTime& frame,
+                                    const Eigen::Vector2d& size_px, const Eigen::Vector2d& px,
+                                    const PairEffects& effects, TimedRay* timed);
+
+// The bearing of a pixel that is exposed so much later than `timed` says. Derivatives by time,
+// rotation and rates can be had from it, not those by lens, shutter and effects.
+void TurnRay(const TimedRay& timed, double later_s, const Eigen::Matrix3d& R_gyro_cam,
+             const RotationChain& chain, Bearing* bearing);
+
 // Derivative of a scalar by the time of exposure, given those by ray_ref and by J_ray_px.
 double ByTime(const Bearing& bearing, const Eigen::Vector3d& by_ray,
               const Eigen::Matrix<double, 3, 2>& by_J_ray_px);

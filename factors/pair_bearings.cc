@@ -6,6 +6,29 @@
 
 namespace camgyro {
 
+void HoldRays(const double* lens, const double* shutter, const double* effects,
+              PairMeasurement* pair) {
+  pair->rays_a.clear();
+  pair->rays_b.clear();
+  if (pair->effects && pair->effects->follows_own_time()) return;
+  const Eigen::Map<const LensParameters> lens_at(lens);
+  const Eigen::Map<const ShutterParameters> shutter_at(shutter);
+  const PairEffects effects_at{pair->effects.get(), effects};
+  const auto evaluate = [&](const FrameTime& frame, const Eigen::Vector2d& px, TimedRay* ray) {
+    return EvaluateTimedRay(*pair->lens, lens_at, shutter_at, frame, pair->size_px, px, effects_at,
+                            ray);
+  };
+  std::vector<TimedRay> a(pair->matches.size()), b(pair->matches.size());
+  for (size_t i = 0; i < pair->matches.size(); ++i) {
+    if (!evaluate(pair->frame_a, pair->matches[i].px_a, &a[i]) ||
+        !evaluate(pair->frame_b, pair->matches[i].px_b, &b[i])) {
+      return;
+    }
+  }
+  pair->rays_a = std::move(a);
+  pair->rays_b = std::move(b);
+}
+
 BearingsOfMatch::BearingsOfMatch(const PairMeasurement& pair, const RotationChain& chain,
                                  const double* lens, const double* shutter,
                                  const double* q_gyro_cam, const double* effects,
@@ -16,11 +39,19 @@ BearingsOfMatch::BearingsOfMatch(const PairMeasurement& pair, const RotationChai
       shutter_(Eigen::Map<const ShutterParameters>(shutter)),
       R_gyro_cam_(Eigen::Map<const Eigen::Quaterniond>(q_gyro_cam).normalized().toRotationMatrix()),
       effects_{pair.effects.get(), effects},
-      frame_a_(own_times ? pair.frame_a.Moved(*own_times[0]) : pair.frame_a),
-      frame_b_(own_times ? pair.frame_b.Moved(*own_times[1]) : pair.frame_b) {}
+      later_a_s_(own_times ? *own_times[0] : 0.0),
+      later_b_s_(own_times ? *own_times[1] : 0.0),
+      frame_a_(pair.frame_a.Moved(later_a_s_)),
+      frame_b_(pair.frame_b.Moved(later_b_s_)) {}
 
 bool BearingsOfMatch::Evaluate(size_t match, bool derivatives, Bearing* a, Bearing* b) const {
   const Match& m = pair_.matches[match];
+  if (!pair_.rays_a.empty()) {
+    TurnRay(pair_.rays_a[match], later_a_s_, R_gyro_cam_, chain_, a);
+    TurnRay(pair_.rays_b[match], later_b_s_, R_gyro_cam_, chain_, b);
+    b->ScaleNoise(m.noise_factor_b);
+    return true;
+  }
   const LensDerivatives by_lens = derivatives ? pair_.by_lens : LensDerivatives::kNone;
   if (!EvaluateBearing(*pair_.lens, lens_, shutter_, R_gyro_cam_, chain_, frame_a_, pair_.size_px,
                        m.px_a, effects_, a, by_lens) ||

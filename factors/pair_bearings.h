@@ -33,6 +33,9 @@ struct PairMeasurement {
   // Jacobians by the other lens parameters are zero, for solves that hold them; with effects: all.
   LensDerivatives by_lens = LensDerivatives::kAll;
   std::shared_ptr<const EffectSet> effects;  // null: none; else never without parameters
+  // The matches' pixels where lens, shutter and effects are held (HoldRays), so that only the
+  // camera's motion is evaluated; empty: all is.
+  std::vector<TimedRay> rays_a, rays_b;
   // Each frame has a time of its own, a parameter: an offset from its stamp (CoplanarityPlane,
   // RelativeRotation).
   bool own_times = false;
@@ -69,6 +72,12 @@ struct PairBearings {
   std::vector<Bearing> a, b;
 };
 
+// Fills the rays of a pair's matches, for as long as these values do not change and nobody asks for
+// derivatives by them. Leaves none where the lens lacks one of them, or where an effect follows the
+// frames' own times.
+void HoldRays(const double* lens, const double* shutter, const double* effects,
+              PairMeasurement* pair);
+
 // The bearings of a pair's matches, one match at a time: those of a whole pair are a quarter of a
 // megabyte, which takes longer to allocate than to fill. Refers to its arguments. own_times: the
 // two offsets from the stamps; null: none.
@@ -87,6 +96,7 @@ class BearingsOfMatch {
   const ShutterParameters shutter_;
   const Eigen::Matrix3d R_gyro_cam_;
   const PairEffects effects_;
+  const double later_a_s_, later_b_s_;  // than their stamps
   const FrameTime frame_a_, frame_b_;
 };
 

@@ -136,6 +136,11 @@ double EffectSet::widened_sigma(PairLatent latent) const {
   return sigma;
 }
 
+bool EffectSet::follows_own_time() const {
+  return std::any_of(items_.begin(), items_.end(),
+                     [](const Item& item) { return item.effect->follows_own_time(); });
+}
+
 int EffectSet::frame_time_spread() const {
   for (const Item& item : items_) {
     if (item.effect->frees_frame_times()) return item.first;

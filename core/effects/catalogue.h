@@ -59,6 +59,8 @@ class EffectSet {
   int num_lens() const;
   // The widest prior of a latent that an effect asks for; 0: none does.
   double widened_sigma(PairLatent latent) const;
+  // Whether one of them does (Effect::follows_own_time).
+  bool follows_own_time() const;
   // Column of the spread of the frames' own times; -1: they have none.
   int frame_time_spread() const;
 

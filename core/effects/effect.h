@@ -97,6 +97,8 @@ class Effect {
   virtual bool is_constant_lens() const { return false; }
   // Made from a calibration so exactly that it is to be made anew when that has moved.
   virtual bool depends_on_calibration() const { return false; }
+  // What it changes depends on the frame's own time (FrameTime::offset_s), not on its stamp alone.
+  virtual bool follows_own_time() const { return false; }
   // Made of the gyro's rates, it takes turns of the camera out of the picture: rotations between
   // pictures then tell no focal length.
   virtual bool hides_turns() const { return false; }

@@ -173,6 +173,7 @@ class LoggedLens final : public Effect {
         Eigen::Vector2d(-shift.y(), shift.x()), Eigen::Vector2d(shift.x(), -shift.y());
   }
   bool depends_on_calibration() const override { return true; }  // the readout time
+  bool follows_own_time() const override { return true; }
   void SetStart(double* values) const override { values[kScale] = 1.0; }
 
  private:

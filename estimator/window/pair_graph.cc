@@ -206,6 +206,10 @@ AddPairResult PairGraph::AddPair(const TimedPair& timed) {
 }
 
 void PairGraph::MakeFactor(int64_t id, Pair* pair) {
+  if (options_.hold_shared && !residual().facts().of_attitudes) {
+    const PairParameters at = SharedParameters();
+    HoldRays(at.lens, at.shutter, at.effects, pair->measurement.get());
+  }
   std::shared_ptr<const ceres::CostFunction> cost = residual().MakeCost(pair->measurement, id);
   if (options_.keep_within_sigmas >= 0.0) {
     KeepBounds bounds{options_.keep_within_sigmas, {}};

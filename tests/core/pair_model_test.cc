@@ -182,6 +182,44 @@ TEST(PairModel, BackpropagationByEffectsMatchesDifferences) {
   }
 }
 
+// A pixel whose ray is kept, exposed 3 ms later than that says, has the bearing and the derivative
+// by time of a frame that is 3 ms later.
+TEST(PairModel, ATimedRayTurnsIntoTheSameBearing) {
+  EffectSetup setup;
+  setup.size_px = Vector2d(752.0, 480.0);
+  setup.frames = {FrameTime(0.0), FrameTime(12.0)};
+  const Result<EffectSet> set =
+      MakeEffects("radial_distortion,clock_skew,readout_direction", setup);
+  ASSERT_TRUE(set) << set.error().message;
+  Eigen::VectorXd values(set->size());
+  for (int i = 0; i < values.size(); ++i) values[i] = 0.02 * set->parameter(i).spread;
+  const PairEffects effects{&*set, values.data()};
+  const Lens& lens = GetLens(DistortionModel::kRadTan);
+  const Vector3d by_ray(0.7, -1.1, 0.4);
+  const Matrix32 by_J = (Matrix32() << 300, -200, 100, 150, -250, 50).finished();
+  const double later_s = 0.003;
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    SCOPED_TRACE(seed);
+    const Case c = RandomCase(seed);
+    const FrameTime frame(c.frame_time_s);
+    const Vector2d size(752.0, 480.0);
+    const Eigen::Matrix3d R_gyro_cam = c.q_gyro_cam.toRotationMatrix();
+    const RotationChain chain(c.times, c.rates);
+    Bearing whole;
+    ASSERT_TRUE(EvaluateBearing(lens, c.lens, c.shutter, R_gyro_cam, chain, frame.Moved(later_s),
+                                size, c.px, effects, &whole));
+    TimedRay timed;
+    ASSERT_TRUE(EvaluateTimedRay(lens, c.lens, c.shutter, frame, size, c.px, effects, &timed));
+    Bearing turned;
+    TurnRay(timed, later_s, R_gyro_cam, chain, &turned);
+    for (Bearing* bearing : {&whole, &turned}) bearing->ScaleNoise({1.2, 0.1, 0.9});
+    EXPECT_TRUE(turned.ray_ref.isApprox(whole.ray_ref, 1e-13));
+    EXPECT_TRUE(turned.J_ray_px.isApprox(whole.J_ray_px, 1e-13));
+    EXPECT_NEAR(ByTime(turned, by_ray, by_J), ByTime(whole, by_ray, by_J),
+                1e-12 * std::abs(ByTime(whole, by_ray, by_J)));
+  }
+}
+
 // Rows alone, also from bottom to top; a sensor that was turned; and both at once, as a pixel that
 // is read first and last at opposite corners.
 TEST(PairModel, ScanOfRowsAndColumns) {

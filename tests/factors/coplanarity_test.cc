@@ -251,6 +251,39 @@ TEST(CoplanarityPlane, JacobianByOneBlockIsThatOfAll) {
   }
 }
 
+// With lens and shutter held, residuals and their derivatives by what is the pair's own are the
+// same.
+TEST(CoplanarityPlane, HeldRaysAreThoseThatAreEvaluated) {
+  PairScene s = MakePairScene(5);
+  Disturb(5, &s);
+  s.pair->own_times = true;
+  s.times_s << 0.002, -0.003;
+  for (Match& match : s.pair->matches) match.noise_factor_b = {0.8, 0.1, 1.2};
+  const CoplanarityPlane factor(s.pair);
+  const auto evaluate = [&] {
+    const auto n = static_cast<Eigen::Index>(s.pair->matches.size());
+    Eigen::MatrixXd all(n, 6);  // residuals; by tau, and by the two times
+    Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> by_tau(n, 3);
+    std::vector<double*> jacobians(factor.parameter_block_sizes().size(), nullptr);
+    jacobians[3] = by_tau.data();
+    jacobians[5] = all.col(4).data();
+    jacobians[6] = all.col(5).data();
+    EXPECT_TRUE(factor.Evaluate(s.Parameters().data(), all.data(), jacobians.data()));
+    all.middleCols<3>(1) = by_tau;
+    return all;
+  };
+  const Eigen::MatrixXd evaluated = evaluate();
+  HoldRays(s.lens.data(), s.shutter.data(), nullptr, s.pair.get());
+  ASSERT_EQ(s.pair->rays_a.size(), s.pair->matches.size());
+  EXPECT_TRUE(evaluate().isApprox(evaluated, 1e-12));
+  s.times_s << 0.004, 0.001;  // they follow the frames' times
+  const Eigen::MatrixXd held = evaluate();
+  EXPECT_FALSE(held.isApprox(evaluated, 1e-3));
+  s.lens[kK1] = -3.0;  // to where it lacks rays
+  HoldRays(s.lens.data(), s.shutter.data(), nullptr, s.pair.get());
+  EXPECT_TRUE(s.pair->rays_a.empty() && s.pair->rays_b.empty());
+}
+
 TEST(CoplanarityPlane, RejectsAStepToWhereALensHasNoRay) {
   PairScene s = MakePairScene(6);
   s.lens[kK1] = -3.0;
