@@ -68,8 +68,11 @@ class TimesOfPair {
 
   // With these times, held. width: how many times larger than it is the noise is taken for.
   bool At(const Eigen::Vector2d& offsets_s, double width = 1.0) {
-    if (!ViewPair(input_, pair_, calibration_, width * noise_px_, options_, &view, offsets_s) ||
-        static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches) {
+    const double noise_px = width * noise_px_;
+    has_view_ = has_view_
+                    ? MoveView(input_, pair_, calibration_, noise_px, options_, offsets_s, &view)
+                    : ViewPair(input_, pair_, calibration_, noise_px, options_, &view, offsets_s);
+    if (!has_view_ || static_cast<int>(view.measurement.matches.size()) < PairGraph::kMinMatches) {
       return false;
     }
     plane = FitPlane(view, first_, step_);
@@ -151,6 +154,7 @@ class TimesOfPair {
   const PairGraphOptions& options_;
   const size_t first_, step_;
   const double spread_s_;
+  bool has_view_ = false;
 };
 
 // A pair with enough of its matches first, first + step, ... to search times by.

@@ -1,5 +1,7 @@
 #include "estimator/window/pair_view.h"
 
+#include <glog/logging.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -125,9 +127,12 @@ std::vector<double> PredictedResiduals(const PairView& view, const PairPlane& of
   return residuals;
 }
 
-bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
-              double noise, const PairGraphOptions& options, PairView* view,
-              const Eigen::Vector2d& offsets_s) {
+namespace {
+
+// All of a view but its matches.
+bool SetUp(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
+           double noise, const PairGraphOptions& options, const Eigen::Vector2d& offsets_s,
+           PairView* view) {
   PairMeasurement& m = view->measurement;
   if (!RatesOfPair(input, pair, calibration, &m.rate_times_s, &view->rates, offsets_s)) {
     return false;
@@ -140,11 +145,10 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
   m.noise = options.match_noise;
   m.robust_threshold = options.robust_threshold;
   m.lens = &GetLens(calibration.distortion_model);
-  m.matches.clear();
   m.q_a_b = pair.rotation.q_a_b;
   const double gap_s = m.frame_b.stamp_s - m.frame_a.stamp_s;
-  const ShutterParameters shutter = ShutterOf(calibration);
-  const Scan scan = ScanOf(shutter, m.size_px, calibration.pair_effects(), m.frame_a);
+  const Scan scan =
+      ScanOf(ShutterOf(calibration), m.size_px, calibration.pair_effects(), m.frame_a);
   m.scan_shares = scan.shares;
   m.readout_over_gap = scan.readout_s / gap_s;
   view->bend_sigma_rad = BendSigma(
@@ -152,25 +156,71 @@ bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibra
                calibration.effects ? calibration.effects->widened_sigma(PairLatent::kTurn) : 0.0),
       scan.readout_s, gap_s);
   m.effects = calibration.pair_effects().set != nullptr ? calibration.effects : nullptr;
-  const RotationChain chain(m.rate_times_s, view->rates);
-  const Eigen::Matrix3d R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
+  return true;
+}
+
+}  // namespace
+
+bool ViewPair(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
+              double noise, const PairGraphOptions& options, PairView* view,
+              const Eigen::Vector2d& offsets_s) {
+  if (!SetUp(input, pair, calibration, noise, options, offsets_s, view)) return false;
+  PairMeasurement& m = view->measurement;
+  m.matches.clear();
   for (auto* bearings : {&view->bearings.a, &view->bearings.b}) {
     bearings->clear();
     bearings->reserve(pair.matches.size());
   }
-  const auto evaluate = [&](const FrameTime& frame, const Eigen::Vector2d& px, Bearing* bearing) {
-    return EvaluateBearing(*m.lens, calibration.lens, shutter, R_gyro_cam, chain, frame, m.size_px,
-                           px, calibration.pair_effects(), bearing, LensDerivatives::kNone);
+  for (auto* rays : {&view->rays_a, &view->rays_b}) {
+    rays->clear();
+    rays->reserve(pair.matches.size());
+  }
+  const RotationChain chain(m.rate_times_s, view->rates);
+  const Eigen::Matrix3d R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
+  const ShutterParameters shutter = ShutterOf(calibration);
+  const auto evaluate = [&](const FrameTime& frame, const Eigen::Vector2d& px, TimedRay* ray) {
+    return EvaluateTimedRay(*m.lens, calibration.lens, shutter, frame, m.size_px, px,
+                            calibration.pair_effects(), ray);
   };
+  TimedRay ray_a, ray_b;
   Bearing a, b;
   for (const Match& match : pair.matches) {
-    if (evaluate(m.frame_a, match.px_a, &a) && evaluate(m.frame_b, match.px_b, &b) &&
-        options.residual->HasResidual(*m.lens, calibration.lens, a, b)) {
-      b.ScaleNoise(match.noise_factor_b);
-      m.matches.push_back(match);
-      view->bearings.a.push_back(a);
-      view->bearings.b.push_back(b);
+    if (!evaluate(m.frame_a, match.px_a, &ray_a) || !evaluate(m.frame_b, match.px_b, &ray_b)) {
+      continue;
     }
+    TurnRay(ray_a, 0.0, R_gyro_cam, chain, &a);
+    TurnRay(ray_b, 0.0, R_gyro_cam, chain, &b);
+    if (!options.residual->HasResidual(*m.lens, calibration.lens, a, b)) continue;
+    b.ScaleNoise(match.noise_factor_b);
+    m.matches.push_back(match);
+    view->rays_a.push_back(ray_a);
+    view->rays_b.push_back(ray_b);
+    view->bearings.a.push_back(a);
+    view->bearings.b.push_back(b);
+  }
+  return true;
+}
+
+bool MoveView(const EstimationInput& input, const TimedPair& pair, const Calibration& calibration,
+              double noise, const PairGraphOptions& options, const Eigen::Vector2d& offsets_s,
+              PairView* view) {
+  CHECK(!options.residual->facts().drops_matches);
+  const auto& effects = calibration.effects;
+  if (effects != nullptr && effects->follows_own_time()) {
+    return ViewPair(input, pair, calibration, noise, options, view, offsets_s);
+  }
+  const Eigen::Vector2d later_s(offsets_s[0] - view->measurement.frame_a.offset_s,
+                                offsets_s[1] - view->measurement.frame_b.offset_s);
+  if (!SetUp(input, pair, calibration, noise, options, offsets_s, view)) return false;
+  const PairMeasurement& m = view->measurement;
+  const RotationChain chain(m.rate_times_s, view->rates);
+  const Eigen::Matrix3d R_gyro_cam = calibration.q_gyro_cam.toRotationMatrix();
+  for (size_t i = 0; i < m.matches.size(); ++i) {
+    view->rays_a[i].time_gyro_s += later_s[0];
+    view->rays_b[i].time_gyro_s += later_s[1];
+    TurnRay(view->rays_a[i], 0.0, R_gyro_cam, chain, &view->bearings.a[i]);
+    TurnRay(view->rays_b[i], 0.0, R_gyro_cam, chain, &view->bearings.b[i]);
+    view->bearings.b[i].ScaleNoise(m.matches[i].noise_factor_b);
   }
   return true;
 }

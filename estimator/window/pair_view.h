@@ -14,10 +14,11 @@
 namespace camgyro {
 
 struct PairView {
-  PairMeasurement measurement;  // those matches that have a residual; rates in one group
-  Eigen::Matrix3Xd rates;       // readings less bias and effects [rad/s]
-  PairBearings bearings;        // without derivatives by the lens
-  BendVector bend_sigma_rad;    // prior
+  PairMeasurement measurement;           // those matches that have a residual; rates in one group
+  Eigen::Matrix3Xd rates;                // readings less bias and effects [rad/s]
+  PairBearings bearings;                 // of a ray that is known (TurnRay)
+  std::vector<TimedRay> rays_a, rays_b;  // of the matches, for MoveView
+  BendVector bend_sigma_rad;             // prior
 };
 
 // Standard deviations of the prior of a pair's bend, given that of its direction's change in time.
@@ -40,6 +41,13 @@ struct PairPlane {
                             const Calibration& calibration, double noise,
                             const PairGraphOptions& options, PairView* view,
                             const Eigen::Vector2d& offsets_s = Eigen::Vector2d::Zero());
+
+// The same view with the frames' times at other offsets, as ViewPair would make it: of a residual
+// that drops no matches (CHECKed), and with the same calibration, but quicker.
+[[nodiscard]] bool MoveView(const EstimationInput& input, const TimedPair& pair,
+                            const Calibration& calibration, double noise,
+                            const PairGraphOptions& options, const Eigen::Vector2d& offsets_s,
+                            PairView* view);
 
 // The plane that fits the matches first, first + step, ... of a view best: the direction searched,
 // its bend with the prior.
