@@ -182,6 +182,7 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
                      const Calibration& calibration, std::shared_ptr<const EffectSet> candidates,
                      double noise, const PairGraphOptions& options) {
   const AllEffects all = AllEffectsOf(calibration, candidates.get());
+  const AllEffects of_model = AllEffectsOf(calibration, nullptr);
   Scores scores;
   scores.num_model = kStateSize + static_cast<int>(calibration.effect_values.size());
   const Eigen::Index size = kStateSize + all.set->size();
@@ -194,14 +195,14 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
     sum.H.setZero(size, size);
     if (!block.empty()) sum.time_s = 0.5 * (block.front().time_a_s + block.back().time_b_s);
     std::vector<PairAlone> projected;
-    const auto linearise = [&](const TimesOfBlock* times) {
+    const auto linearise = [&](const AllEffects& effects, const TimesOfBlock* times) {
       projected.clear();
       pairs[b].clear();
       for (const TimedPair& pair : block) {
         PairSystem system;
         std::optional<Eigen::Vector2d> times_s;
         if (times) times_s.emplace(times->Best(pair.frame_a), times->Best(pair.frame_b));
-        if (!MakePairSystem(input, pair, calibration, all, noise, options, &system, times_s)) {
+        if (!MakePairSystem(input, pair, calibration, effects, noise, options, &system, times_s)) {
           continue;
         }
         PairScore score;
@@ -215,10 +216,14 @@ Scores ComputeScores(const EstimationInput& input, const std::vector<PairBlock>&
         pairs[b].push_back(std::move(score));
       }
     };
-    linearise(nullptr);
-    // That was at the times that each pair's own matches tell, which differ by what each has wrong.
-    const TimesOfBlock times(projected, size);
-    if (!times.empty()) linearise(&times);
+    // At the times that each pair's own matches tell, which differ by what each has wrong. Where
+    // they tell any, these are all that is taken from it, and the candidates have no part in them.
+    const bool with_times = all.frame_time_spread_s > 0.0;
+    linearise(with_times ? of_model : all, nullptr);
+    if (with_times) {
+      const TimesOfBlock times(projected, scores.num_model);
+      linearise(all, times.empty() ? nullptr : &times);
+    }
     SumUp(projected, scores.num_model, &pairs[b], &sum);
   });
   for (size_t b = 0; b < blocks.size(); ++b) {
