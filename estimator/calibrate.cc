@@ -309,11 +309,8 @@ class CalibrationJob {
     report_.calibration = refined->calibration;
     report_.quality = refined->quality;
     report_.skipped_pairs = refined->skipped_pairs;
-    report_.frame_times =
-        options_.times_between
-            ? TimesOfAllFrames(recording_, refined->calibration, refined->frame_times,
-                               refined->quality.noise_px, refinement.graph)
-            : refined->frame_times;
+    report_.frame_times = refined->frame_times;
+    if (options_.times_between) TakeTimesOfAllFrames(recording_, refinement.graph, &report_);
     if (!refined->late_frames.empty()) {
       report_.notes.push_back(Describe(refined->late_frames, refined->frame_times));
     }

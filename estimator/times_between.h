@@ -6,6 +6,7 @@
 
 #include "core/calibration.h"
 #include "core/recording.h"
+#include "estimator/calibrate.h"
 #include "estimator/window/frame_times.h"
 #include "estimator/window/pair_graph_options.h"
 
@@ -20,6 +21,19 @@ namespace camgyro {
 std::vector<FrameOffset> TimesOfAllFrames(const Recording& recording, const Calibration& fit,
                                           const std::vector<FrameOffset>& of_pairs, double noise_px,
                                           const PairGraphOptions& graph);
+
+// By how much further apart than their sigmas say the left and the right half of the picture are in
+// the times that they tell of the same frames, of stretches spread over the recording: noise in
+// both, and what moves parts of the picture differently, which no sigma of a frame's time knows. 1
+// where it is not more, or too few frames are told by both. Arguments as above.
+double DisagreementOfSides(const Recording& recording, const Calibration& fit,
+                           const std::vector<FrameOffset>& of_pairs, double noise_px,
+                           const PairGraphOptions& graph);
+
+// Both for a report, whose frame_times are of pairs before: times of all frames, with sigmas that
+// know of the disagreement, and a note where there is some.
+void TakeTimesOfAllFrames(const Recording& recording, const PairGraphOptions& graph,
+                          CalibrationReport* report);
 
 }  // namespace camgyro
 

@@ -172,9 +172,8 @@ void AddTimesBetween(const Recording& recording, const DiagnoseOptions& options,
                      Diagnosis* diagnosis) {
   if (!diagnosis->before || diagnosis->after) return;
   CalibrationReport& report = *diagnosis->before;
-  report.frame_times =
-      TimesOfAllFrames(recording, report.calibration, report.frame_times, report.quality.noise_px,
-                       GraphOptionsFor(recording, report.start, options.calibrate.window.graph));
+  TakeTimesOfAllFrames(
+      recording, GraphOptionsFor(recording, report.start, options.calibrate.window.graph), &report);
 }
 
 // All but the times of frames in between.

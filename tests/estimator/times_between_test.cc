@@ -1,4 +1,5 @@
-// Frames between the pairs of a tracker that re-anchors get times of their own, too.
+// Frames between the pairs of a tracker that re-anchors get times of their own, too, with sigmas
+// that know what moves parts of the picture.
 #include "estimator/times_between.h"
 
 #include <gtest/gtest.h>
@@ -8,11 +9,13 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <random>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "core/effects/catalogue.h"
+#include "core/robust_statistics.h"
 #include "estimator/window/pair_graph.h"
 #include "estimator/window/refinement.h"
 #include "tests/estimator/simulated_input.h"
@@ -118,6 +121,61 @@ TEST(TimesOfAllFrames, AreThoseOfTheFitWhereItLeavesNoFrameOut) {
   Fitted f = Fit(simulation::MotionKind::kHandheld, 0.1, "frame_stamp_jitter");
   f.s.recording.match_noise = MatchNoise::kBothImages;
   EXPECT_EQ(TimesOf(f).size(), f.fit.frame_times.size());
+}
+
+constexpr double kShakePx = 0.5;  // five times the noise
+
+// Moves what lies left of `right_px` in each picture, all of it by the same, by steps of this size.
+void Shake(double right_px, double sigma_px, Recording* recording) {
+  std::mt19937_64 generator(7);
+  std::normal_distribution<double> normal(0.0, sigma_px);
+  for (auto& points : recording->tracks) {
+    const double x = normal(generator), y = normal(generator);
+    for (TrackedPoint& point : points) {
+      if (point.px.x() < right_px) point.px += Eigen::Vector2d(x, y);
+    }
+  }
+}
+
+// What moves the whole picture both halves take for the same times, for the most part; what moves
+// one of them, not.
+TEST(DisagreementOfSides, IsThatOfWhatMovesOneOfThem) {
+  const Fitted f = Fit(simulation::MotionKind::kHandheld, 0.1, "frame_stamp_jitter");
+  const double width_px = f.fit.calibration.width_px;
+  const auto disagreement = [&](double right_px) {
+    Recording recording = f.s.recording;
+    Shake(right_px, kShakePx, &recording);
+    return DisagreementOfSides(recording, f.fit.calibration, f.fit.frame_times,
+                               f.fit.quality.noise_px, f.options.graph);
+  };
+  EXPECT_LT(disagreement(0.0), 1.15);
+  const double of_one = disagreement(0.5 * width_px);
+  EXPECT_GT(of_one, 1.8);
+  // A shift across the flow is no time, and goes into directions, which each half has by itself.
+  EXPECT_LT(disagreement(width_px), 0.75 * of_one);
+}
+
+TEST(TakeTimesOfAllFrames, SigmasKnowOfSidesThatDisagree) {
+  const Fitted f = Fit(simulation::MotionKind::kHandheld, 0.1, "frame_stamp_jitter");
+  CalibrationReport plain;
+  plain.calibration = f.fit.calibration;
+  plain.quality = f.fit.quality;
+  plain.frame_times = f.fit.frame_times;
+  CalibrationReport shaken = plain;
+  TakeTimesOfAllFrames(f.s.recording, f.options.graph, &plain);
+  EXPECT_TRUE(plain.notes.empty());
+  EXPECT_GT(plain.frame_times.size(), f.fit.frame_times.size());
+  Recording recording = f.s.recording;
+  Shake(0.5 * f.fit.calibration.width_px, kShakePx, &recording);
+  TakeTimesOfAllFrames(recording, f.options.graph, &shaken);
+  ASSERT_EQ(shaken.notes.size(), 1u);
+  const auto told = [](const CalibrationReport& report) {
+    std::vector<double> sigmas_s;
+    for (const FrameOffset& frame : report.frame_times) sigmas_s.push_back(frame.sigma_s);
+    EXPECT_LT(*std::max_element(sigmas_s.begin(), sigmas_s.end()), kMostSpreadS);
+    return MedianInPlace(&sigmas_s);
+  };
+  EXPECT_GT(told(shaken), 1.5 * told(plain));
 }
 
 }  // namespace
