@@ -96,7 +96,7 @@ class BearingsOfMatch {
   const ShutterParameters shutter_;
   const Eigen::Matrix3d R_gyro_cam_;
   const PairEffects effects_;
-  const double later_a_s_, later_b_s_;  // than their stamps
+  const double later_a_s_, later_b_s_;  // than the measurement says
   const FrameTime frame_a_, frame_b_;
 };
 
