@@ -267,7 +267,9 @@ void PairGraph::AddDirection(int64_t id, Pair* pair) {
   PairPlane plane{Eigen::Vector3d::UnitZ(), BendVector::Zero()};
   if (start_ != nullptr) {
     const auto known = start_->planes.find(id);
-    if (known != start_->planes.end()) plane = known->second;
+    if (known != start_->planes.end()) {
+      plane = known->second.plane.TurnedBy(ReferenceFrom(*pair, known->second.time_s));
+    }
   }
   graph_.AddBlock(DirectionBlock(id), {Geometry::kDirection, plane.tau, {}});
   graph_.AddBlock(BendBlock(id), {Geometry::kEuclidean, plane.bend, {}});
@@ -281,6 +283,13 @@ void PairGraph::AddDirection(int64_t id, Pair* pair) {
       std::make_shared<GaussianPrior>(
           std::vector<GaussianPrior::Block>{{BendVector::Zero(), pair->bend_sigma_rad, false}}),
       {BendBlock(id)});
+}
+
+Eigen::Matrix3d PairGraph::ReferenceFrom(const Pair& pair, double time_s) const {
+  const PairMeasurement& m = *pair.measurement;
+  std::vector<const double*> groups;
+  for (const int64_t group : pair.groups) groups.push_back(graph_.value(RatesBlock(group)).data());
+  return RotationChain(m.rate_times_s, GatherRates(m, groups.data())).At(time_s).R_ref_gyro;
 }
 
 std::vector<BlockId> PairGraph::BlocksOf(int64_t id, const Pair& pair) const {

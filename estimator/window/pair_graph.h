@@ -31,7 +31,14 @@ namespace camgyro {
 
 // What a graph has found for each pair and frame: where another fit of them begins.
 struct PairLatents {
-  std::map<int64_t, PairPlane> planes;      // by pair
+  // In the gyro frame at a time that the rates of another graph have, too: a graph's own reference,
+  // the frame at the first rate of a pair, depends on what it adds before that pair, and on how far
+  // around it.
+  struct Plane {
+    PairPlane plane;
+    double time_s = 0.0;  // in the middle of the pair's rates
+  };
+  std::map<int64_t, Plane> planes;          // by pair
   std::map<int64_t, double> frame_times_s;  // by PairGraph::FrameNumber
   RatesFound rates;
 
@@ -187,6 +194,8 @@ class PairGraph {
   // Drops the matches without a residual: a pair is solved as a whole. False if too few are left.
   [[nodiscard]] bool KeepMatches(const RateGroups::Cover& cover, PairMeasurement* pair) const;
   void AddDirection(int64_t id, Pair* pair);
+  // R_ref_gyro at a time, by the rates of now.
+  Eigen::Matrix3d ReferenceFrom(const Pair& pair, double time_s) const;
   void SetLateFrames(LateFrames late);
   // The frames' own times, if they have any.
   void AddFrameTimes(const TimedPair& timed, Pair* pair);

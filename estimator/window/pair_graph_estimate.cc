@@ -145,7 +145,10 @@ PairLatents PairGraph::Latents() const {
   latents.rates = rates_.Found(graph_);
   for (const auto& [id, pair] : pairs_) {
     if (residual().facts().has_direction) {
-      latents.planes[id] = {graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+      const PairPlane plane{graph_.value(DirectionBlock(id)), graph_.value(BendBlock(id))};
+      const std::vector<double>& times_s = pair.measurement->rate_times_s;
+      const double time_s = times_s[times_s.size() / 2];
+      latents.planes[id] = {plane.TurnedBy(ReferenceFrom(pair, time_s).transpose()), time_s};
     }
   }
   latents.frame_times_s = OwnTimes();

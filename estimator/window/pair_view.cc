@@ -58,6 +58,13 @@ BendVector BendSigma(double turn_sigma_rad_s, double readout_s, double gap_s) {
   return sigma.cwiseMax(1e-4);
 }
 
+PairPlane PairPlane::TurnedBy(const Eigen::Matrix3d& R_to_from) const {
+  PairPlane turned{R_to_from * tau, bend};
+  turned.bend.head<3>() = R_to_from * bend.head<3>();
+  turned.bend.tail<3>() = R_to_from * bend.tail<3>();
+  return turned;
+}
+
 Eigen::Vector3d PairPlane::DirectionOf(const PairMeasurement& pair, size_t i) const {
   const Eigen::Vector2d shares = CoplanarityPlane::BendShares(pair, pair.matches[i]);
   return tau + shares[0] * bend.head<3>() + shares[1] * bend.tail<3>();

@@ -29,6 +29,9 @@ struct PairPlane {
   Eigen::Vector3d tau = Eigen::Vector3d::UnitZ();
   BendVector bend = BendVector::Zero();
 
+  // The same in another frame. R_to_from: takes vectors of this one's frame there.
+  PairPlane TurnedBy(const Eigen::Matrix3d& R_to_from) const;
+
   // Of match i.
   Eigen::Vector3d DirectionOf(const PairMeasurement& pair, size_t i) const;
 };

@@ -193,6 +193,42 @@ TEST(PairGraph, LeavesOutMatchesWithoutATransfer) {
   EXPECT_EQ(residuals_of(3), -1);  // fewer than 8 left
 }
 
+// Another graph of the same pairs, which needs rates from further around each pair and has not the
+// first ones: the frame of a pair's first rate, in which its direction is, is another one there.
+TEST(PairGraph, BeginsWhereAnotherWithOtherRatesHasEnded) {
+  constexpr double kDensity = 4e-3;  // so noisy that each sample has a value of its own
+  simulation::Scenario scenario = ShortScenario(3.0);
+  scenario.gyro.noise_density_rad_s_rtHz = kDensity;
+  const Simulated s = SimulateTracks(scenario).value();
+  const EstimationInput input = MakeEstimationInput(s.recording, SelectPairs(s.recording));
+  const Prior prior = StartOffTheTruth(s.truth);
+  PairGraphOptions options;
+  options.gyro_sigma_rad_s.setConstant(kDensity * std::sqrt(scenario.gyro.rate_hz));
+  constexpr size_t kLater = 10;
+  const auto made = [&](size_t first, const Calibration& start,
+                        std::shared_ptr<const PairLatents> latents) {
+    auto graph = std::make_unique<PairGraph>(start, prior, options, std::move(latents));
+    for (const TimedRate& rate : input.rates) graph->AddRate(rate);
+    for (size_t i = first; i < input.pairs.size(); ++i) {
+      EXPECT_EQ(graph->AddPair(input.pairs[i]), AddPairResult::kAdded);
+    }
+    return graph;
+  };
+  const auto ended = made(kLater / 2, prior.mean, nullptr);
+  ASSERT_TRUE(ended->Solve({30, 1e-6}).usable);
+  const auto residuals = ended->AllResiduals(/*search=*/false);
+
+  options.rate_margin_s += 0.0173;
+  const auto again =
+      made(kLater, ended->Estimate(), std::make_shared<PairLatents>(ended->Latents()));
+  const auto same = again->AllResiduals(/*search=*/false);
+  ASSERT_EQ(same.size() + kLater - kLater / 2, residuals.size());
+  for (size_t i = 0; i < same.size(); ++i) {
+    EXPECT_THAT(same[i],
+                testing::Pointwise(testing::DoubleNear(1e-3), residuals[i + kLater - kLater / 2]));
+  }
+}
+
 TEST(PairGraph, NoisyGyrosHaveShorterRateSteps) {
   PairGraphOptions options;
   options.gyro_sigma_rad_s.setConstant(0.003);  // of a phone, at 200 Hz
