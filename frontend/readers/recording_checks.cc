@@ -13,8 +13,10 @@ namespace camgyro {
 namespace {
 
 constexpr double kGyroFullScaleRadS = 2000.0 * M_PI / 180.0;  // of most MEMS gyros, their maximum
-constexpr double kFastestGyroHz = 100e3;
-constexpr double kFastestCameraHz = 100e3;
+// Stamps in microseconds that are read as nanoseconds look like rates of no sensor: a MEMS gyro
+// gives at most 32000 samples per second, and of a camera, 10 frames per second look like 10000.
+constexpr double kFastestGyroHz = 40e3;
+constexpr double kFastestCameraHz = 10e3;
 
 // Two sensors whose samples take turns: neighbours differ by the sensors' biases and axes, samples
 // two rows apart by the motion only. Of one sensor, samples farther apart differ more.

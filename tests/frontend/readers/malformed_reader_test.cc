@@ -74,7 +74,8 @@ const Malformed kMalformed[] = {
    {"cam0/data.csv:2:", "names the file '/etc/passwd'"}},
   {"FrameExposureInNanoseconds", "cam0/data.csv", "1000000000,,5000000\n1033000000,,0.005\n",
    {"cam0/data.csv:1:", "exposure [s]", "5e+06 s", "expected seconds"}},
-  {"FrameStampsInMicroseconds", "cam0/data.csv", "1000000\n1003300\n1006600\n", {"cam0: ", "3300 ns", "expected stamps in nanoseconds"}},
+  {"FrameStampsInMicroseconds", "cam0/data.csv", "1000000\n1033300\n1066600\n", {"cam0: ", "33300 ns", "expected stamps in nanoseconds"}},
+  {"FastFrameStampsInMicroseconds", "cam0/data.csv", "1000000\n1003300\n1006600\n", {"cam0: ", "3300 ns", "expected stamps in nanoseconds"}},
 
   {"TrackStampUnknown", "cam0/tracks.csv", "1000000000,1,2,3\n1000000001,1,2,3\n",
    {"cam0/tracks.csv:2:", "1000000001 is not the stamp of a frame", "expected one of cam0/data.csv"}},
