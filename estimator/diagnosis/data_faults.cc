@@ -1,7 +1,6 @@
 #include "estimator/diagnosis/data_faults.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "core/effects/catalogue.h"
@@ -9,9 +8,7 @@
 #include "core/gyro_gap.h"
 #include "core/robust_statistics.h"
 #include "core/saturation.h"
-#include "core/so3.h"
 #include "core/time.h"
-#include "core/usual_focal.h"
 
 namespace camgyro {
 namespace {
@@ -100,22 +97,6 @@ std::vector<int> RepeatedPictures(const Recording& recording) {
   return repeated;
 }
 
-// Power of rates in a band, by differences of moving averages; rates and the times between them.
-double BandPower(const std::vector<Eigen::Vector3d>& rates, int shorter, int longer) {
-  const int n = static_cast<int>(rates.size());
-  const auto mean = [&](int at, int width) {
-    const int from = std::max(0, at - width / 2), to = std::min(n, at - width / 2 + width);
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (int i = from; i < to; ++i) sum += rates[static_cast<size_t>(i)];
-    return Eigen::Vector3d(sum / std::max(1, to - from));
-  };
-  std::vector<double> power;  // the median forgives wrong rotations of the camera
-  for (int i = longer / 2; i + longer / 2 < n; ++i) {
-    power.push_back((mean(i, shorter) - mean(i, longer)).squaredNorm());
-  }
-  return power.empty() ? 0.0 : MedianInPlace(&power);
-}
-
 }  // namespace
 
 std::vector<DataFault> FindDataFaults(const Recording& recording) {
@@ -184,94 +165,6 @@ int DropRepeatedPictures(Recording* recording) {
   recording->faults.push_back({"duplicated_frames", count, finding});
   recording->notes.push_back(finding);
   return count;
-}
-
-std::optional<std::string> FindElectronicStabilisation(
-    const Recording& recording, const std::vector<CameraRotation>& rotations) {
-  // Mean rates over the rotations, of the camera and, whatever the delay, of the gyro.
-  std::vector<Eigen::Vector3d> camera, gyro;
-  double interval_s = 0.0;
-  for (const CameraRotation& rotation : rotations) {
-    const double dt =
-        SecondsSince(recording.frames[static_cast<size_t>(rotation.frame_a)].stamp_ns,
-                     recording.frames[static_cast<size_t>(rotation.frame_b)].stamp_ns);
-    camera.push_back(Log(rotation.q_a_b) / dt);
-    interval_s += dt;
-  }
-  if (camera.size() < 60) return std::nullopt;
-  interval_s /= static_cast<double>(camera.size());
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  int in_sum = 0;
-  int64_t begin_ns = recording.gyro.front().stamp_ns;
-  for (const GyroSample& sample : recording.gyro) {
-    if (in_sum > 0 && SecondsSince(begin_ns, sample.stamp_ns) >= interval_s) {
-      gyro.push_back(sum / in_sum);
-      begin_ns = StampAt(begin_ns, interval_s);
-      sum.setZero();
-      in_sum = 0;
-    }
-    sum += sample.omega_gyro_rad_s;
-    ++in_sum;
-  }
-  const auto frames = [&](double seconds) {
-    return std::max(1, static_cast<int>(std::lround(seconds / interval_s)));
-  };
-  // Between averages over 0.1 and 0.5 s: about 1 to 5 Hz. Between 1 and 4 s: slow.
-  const double fast = BandPower(camera, frames(0.1), frames(0.5)) /
-                      std::max(1e-12, BandPower(gyro, frames(0.1), frames(0.5)));
-  const double slow = BandPower(camera, frames(1.0), frames(4.0)) /
-                      std::max(1e-12, BandPower(gyro, frames(1.0), frames(4.0)));
-  if (fast < 0.15 && fast < 0.35 * slow) {
-    return Format(
-        "of the gyro's rotation, the picture has %.0f %% below 0.5 Hz, but only %.0f %% "
-        "above 1 Hz",
-        100.0 * std::sqrt(slow), 100.0 * std::sqrt(fast));
-  }
-  return std::nullopt;
-}
-
-std::optional<DataFault> RepairGyro(const CameraRotationsAt& rotations_at,
-                                    const StartOptions& options, Recording* recording) {
-  const double focal = FocalToBeginWith(recording->camera);
-  const std::vector<CameraRotation> rotations = rotations_at(*recording, {{focal, {}}}).front();
-  struct Repair {
-    double scale;
-    bool mirror;
-    const char* name;
-    const char* finding;
-    const char* advice;
-  };
-  const std::array<Repair, 4> repairs = {
-      Repair{M_PI / 180.0, false, "gyro_unit", "the gyro's rates are in deg/s, not rad/s",
-             "convert them to rad/s in the recording"},
-      Repair{180.0 / M_PI, false, "gyro_unit",
-             "the gyro's rates were divided by 57.3 once too often",
-             "convert from deg/s to rad/s only once"},
-      Repair{1.0, true, "gyro_axes",
-             "the gyro's axes are left-handed: two axes are exchanged, or one has the wrong sign",
-             "correct the order or the signs of the gyro's columns"},
-      Repair{M_PI / 180.0, true, "gyro_unit_and_axes",
-             "the gyro's rates are in deg/s, and its axes left-handed (two exchanged, or one sign)",
-             "correct the unit and the order or the signs of the gyro's columns"}};
-  std::optional<DataFault> best;
-  Recording repaired = *recording;
-  double best_explained = 0.8;
-  for (const Repair& repair : repairs) {
-    Recording trial = *recording;
-    trial.camera.q_gyro_cam.reset();
-    for (GyroSample& sample : trial.gyro) {
-      sample.omega_gyro_rad_s *= repair.mirror ? -repair.scale : repair.scale;
-    }
-    const Result<StartResult> start = FindStart(trial, rotations, options);
-    if (start && start->explained > best_explained && start->rate_ratio > 0.5 &&
-        start->rate_ratio < 2.0) {
-      best_explained = start->explained;
-      best = DataFault{repair.name, repair.finding, repair.advice};
-      repaired = std::move(trial);
-    }
-  }
-  if (best) *recording = std::move(repaired);
-  return best;
 }
 
 }  // namespace camgyro

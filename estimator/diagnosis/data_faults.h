@@ -1,14 +1,11 @@
-// Faults that the data show without a fit, and recordings that no model repairs.
+// Faults that the data show without a fit.
 #ifndef CAMGYRO_ESTIMATOR_DIAGNOSIS_DATA_FAULTS_H_
 #define CAMGYRO_ESTIMATOR_DIAGNOSIS_DATA_FAULTS_H_
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/recording.h"
-#include "estimator/start/find_start.h"
-#include "estimator/start/focal_scan.h"
 
 namespace camgyro {
 
@@ -29,18 +26,6 @@ std::vector<DataFault> FindDataFaults(const Recording& recording);
 // nothing is lost. Records the fault and returns how many; a recording with repeats in more than
 // half of the places stays as it is.
 int DropRepeatedPictures(Recording* recording);
-
-// Is the picture without the fast rotation that the gyro has? Compares the power of the rates below
-// 0.5 Hz and above 1 Hz, which needs neither delay nor mounting. `rotations`: of the camera, some
-// 0.1 s long or shorter, at least 60. The finding, or nothing.
-std::optional<std::string> FindElectronicStabilisation(
-    const Recording& recording, const std::vector<CameraRotation>& rotations);
-
-// A recording whose start was refused: does it fit with the gyro in another unit (deg/s), or with
-// one axis mirrored (a wrong order of axes is a mirror, too)? Repairs the gyro and says what it
-// was.
-std::optional<DataFault> RepairGyro(const CameraRotationsAt& rotations_at,
-                                    const StartOptions& options, Recording* recording);
 
 }  // namespace camgyro
 

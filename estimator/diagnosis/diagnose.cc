@@ -10,6 +10,7 @@
 #include "core/usual_focal.h"
 #include "estimator/astray.h"
 #include "estimator/diagnosis/gain_rule.h"
+#include "estimator/diagnosis/refused_start.h"
 #include "estimator/diagnosis/step_time.h"
 #include "estimator/diagnosis/thresholds.h"
 #include "estimator/times_between.h"
@@ -47,8 +48,8 @@ void AddFoundAtStart(const CalibrationReport& report, Diagnosis* diagnosis) {
   }
 }
 
-// As calibrate has it. If that is refused: a gyro in the wrong unit or with mirrored axes, which is
-// repaired, or a picture without the fast rotation?
+// As calibrate has it. If that is refused: is something of it other than its format says, which is
+// repaired, or the picture without the fast rotation?
 Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAt& rotations_at,
                                             const CalibrateOptions& options,
                                             const Progress& progress, Recording* recording,
@@ -60,7 +61,7 @@ Result<CalibrationReport> CalibrateOrSayWhy(const CameraRotationsAt& rotations_a
   Result<CalibrationReport> report =
       CalibrateRecording(*recording, rotations_at, plain, Part(progress, 0.0, 1.0));
   if (report || report.error().kind != ErrorKind::kCannotEstimate) return report;
-  if (const auto repaired = RepairGyro(rotations_at, options.start, recording)) {
+  if (const auto repaired = RepairRecording(rotations_at, options.start, recording)) {
     faults->push_back(*repaired);
     return CalibrateRecording(*recording, rotations_at, plain, progress);
   }

@@ -71,8 +71,9 @@ Verdict Judge(const LagSearch& search, double gyro_noise_rad_s, double delay_off
                Percent(explained) + " of the gyro's motion" +
                (search.on_edge ? ", at the edge of the search" : "") + "; gyro rms " +
                Rate(fit.gyro_rms_rad_s) + ", camera rms " + Rate(fit.cam_rms_rad_s) +
-               "): electronically stabilised, or clocks that do not "
-               "belong together, or camera rotations that are mostly wrong";
+               "): electronically stabilised, stamps of a slow motion, other columns than the "
+               "gyro's, clocks that do not belong together, or camera rotations that are mostly "
+               "wrong (camgyro diagnose asks which)";
     }
     return {Outcome::kDoesNotFollow, reason};
   }

@@ -3,22 +3,12 @@
 #include <gmock/gmock.h>
 
 #include "core/saturation.h"
-#include "core/so3.h"
-#include "frontend/camera_rotations.h"
-#include "simulation/simulate.h"
+#include "tests/estimator/diagnosis/simulated_recording.h"
 
 namespace camgyro {
 namespace {
 
 using testing::HasSubstr;
-
-simulation::Simulated Simulate(const std::vector<std::string>& overrides) {
-  const auto scenario = simulation::ParseScenario("duration_s: 12", overrides);
-  EXPECT_TRUE(scenario) << scenario.error().message;
-  auto simulated = simulation::SimulateTracks(*scenario);
-  EXPECT_TRUE(simulated) << simulated.error().message;
-  return std::move(*simulated);
-}
 
 std::vector<std::string> Names(const std::vector<DataFault>& faults) {
   std::vector<std::string> names;
@@ -26,30 +16,16 @@ std::vector<std::string> Names(const std::vector<DataFault>& faults) {
   return names;
 }
 
-// The camera's rotations as they truly are.
-std::vector<CameraRotation> TrueRotations(const simulation::Simulated& s) {
-  std::vector<CameraRotation> rotations;
-  for (size_t i = 0; i + 1 < s.frames.size(); ++i) {
-    CameraRotation rotation;
-    rotation.frame_a = static_cast<int>(i);
-    rotation.frame_b = static_cast<int>(i) + 1;
-    rotation.q_a_b = Eigen::Quaterniond(Eigen::Matrix3d(s.frames[i].state.R_world_cam.transpose() *
-                                                        s.frames[i + 1].state.R_world_cam));
-    rotation.sigma_rad = 1e-3;
-    rotations.push_back(rotation);
-  }
-  return rotations;
-}
-
 TEST(DataFaults, NoneInSoundData) {
   for (const char* motion : {"motion.kind=walking", "motion.kind=running", "motion.kind=slow"}) {
-    EXPECT_THAT(Names(FindDataFaults(Simulate({motion}).recording)), testing::IsEmpty()) << motion;
+    EXPECT_THAT(Names(FindDataFaults(SimulateFor12S({motion}).recording)), testing::IsEmpty())
+        << motion;
   }
 }
 
 TEST(DataFaults, Saturation) {
   const auto simulated =
-      Simulate({"motion.kind=running", "effects.gyro_saturation={limit_rad_s: 2.0}"});
+      SimulateFor12S({"motion.kind=running", "effects.gyro_saturation={limit_rad_s: 2.0}"});
   const auto faults = FindDataFaults(simulated.recording);
   ASSERT_THAT(Names(faults), testing::ElementsAre("gyro_saturation"));
   EXPECT_THAT(faults[0].finding, HasSubstr("2.000 rad/s"));
@@ -64,7 +40,7 @@ TEST(DataFaults, Saturation) {
 }
 
 TEST(DataFaults, DroppedFramesAndSamples) {
-  Recording recording = Simulate({}).recording;
+  Recording recording = SimulateFor12S({}).recording;
   recording.frames.erase(recording.frames.begin() + 100, recording.frames.begin() + 103);
   recording.tracks.erase(recording.tracks.begin() + 100, recording.tracks.begin() + 103);
   recording.gyro.erase(recording.gyro.begin() + 500, recording.gyro.begin() + 520);
@@ -77,7 +53,7 @@ TEST(DataFaults, DroppedFramesAndSamples) {
 // A frame that comes late leaves a gap before it, and none in what was recorded; nor do frames that
 // wait for it and come close after it. Where one is missing beside, the gap is longer.
 TEST(DataFaults, LateFramesAreNoGaps) {
-  Recording recording = Simulate({}).recording;
+  Recording recording = SimulateFor12S({}).recording;
   recording.frames[50].stamp_ns += 28000000;
   for (const size_t i : {80U, 81U}) {
     recording.frames[i].stamp_ns =
@@ -94,7 +70,7 @@ TEST(DataFaults, LateFramesAreNoGaps) {
 
 // Every fifth picture is shown twice, with the stamp of the one that is missing.
 TEST(DataFaults, RepeatedPicturesAreLeftOut) {
-  const Recording sound = Simulate({"motion.kind=running"}).recording;
+  const Recording sound = SimulateFor12S({"motion.kind=running"}).recording;
   Recording recording = sound;
   int repeats = 0;
   for (size_t i = 5; i + 1 < recording.tracks.size(); i += 5) {
@@ -135,7 +111,7 @@ TEST(DataFaults, RepeatedPicturesAreLeftOut) {
 
 // A stream that hangs for a quarter of a second, while the camera turns on.
 TEST(DataFaults, AFrozenPictureIsLeftOut) {
-  Recording recording = Simulate({"motion.kind=running"}).recording;
+  Recording recording = SimulateFor12S({"motion.kind=running"}).recording;
   const size_t all = recording.frames.size();
   for (size_t i = 60; i < 67; ++i) recording.tracks[i] = recording.tracks[59];
   EXPECT_EQ(DropRepeatedPictures(&recording), 7);
@@ -146,7 +122,7 @@ TEST(DataFaults, AFrozenPictureIsLeftOut) {
 }
 
 TEST(DataFaults, DuplicatedFrames) {
-  Recording recording = Simulate({"motion.kind=running"}).recording;
+  Recording recording = SimulateFor12S({"motion.kind=running"}).recording;
   for (const size_t i : {50u, 120u}) recording.tracks[i] = recording.tracks[i - 1];
   const auto faults = FindDataFaults(recording);
   ASSERT_THAT(Names(faults), testing::ElementsAre("duplicated_frames"));
@@ -154,73 +130,11 @@ TEST(DataFaults, DuplicatedFrames) {
 }
 
 TEST(DataFaults, ARateThatIsNotWhatTheFileClaims) {
-  Recording recording = Simulate({}).recording;
+  Recording recording = SimulateFor12S({}).recording;
   recording.gyro_info.declared_rate_hz = 100.0;
   const auto faults = FindDataFaults(recording);
   ASSERT_THAT(Names(faults), testing::ElementsAre("gyro_rate"));
   EXPECT_THAT(faults[0].finding, testing::AllOf(HasSubstr("100 Hz"), HasSubstr("200 Hz")));
-}
-
-TEST(DataFaults, RepairsUnitAndHandedness) {
-  const auto simulated = Simulate({"motion.kind=running"});
-  const auto rotations_at = [&](const Recording&, const std::vector<RotationTrial>&) {
-    return std::vector<std::vector<CameraRotation>>{TrueRotations(simulated)};
-  };
-  EXPECT_FALSE([&] {  // a mirrored gyro of a sound recording explains less
-    Recording sound = simulated.recording;
-    for (GyroSample& sample : sound.gyro) sample.omega_gyro_rad_s.setZero();
-    return RepairGyro(rotations_at, {}, &sound).has_value();
-  }());
-  Recording degrees = simulated.recording;
-  for (GyroSample& sample : degrees.gyro) sample.omega_gyro_rad_s *= 180.0 / M_PI;
-  const auto unit = RepairGyro(rotations_at, {}, &degrees);
-  ASSERT_TRUE(unit);
-  EXPECT_EQ(unit->name, "gyro_unit");
-  EXPECT_NEAR(degrees.gyro[100].omega_gyro_rad_s.x(),
-              simulated.recording.gyro[100].omega_gyro_rad_s.x(), 1e-12);
-  Recording exchanged = simulated.recording;
-  for (GyroSample& sample : exchanged.gyro) {
-    std::swap(sample.omega_gyro_rad_s.x(), sample.omega_gyro_rad_s.y());
-  }
-  const auto axes = RepairGyro(rotations_at, {}, &exchanged);
-  ASSERT_TRUE(axes);
-  EXPECT_EQ(axes->name, "gyro_axes");
-}
-
-TEST(DataFaults, ElectronicStabilisation) {
-  for (const char* motion :
-       {"motion.kind=walking", "motion.kind=running", "motion.kind=handheld"}) {
-    const auto sound = Simulate({"duration_s=30", motion});
-    EXPECT_FALSE(FindElectronicStabilisation(sound.recording, TrueRotations(sound))) << motion;
-  }
-  const auto stabilised = Simulate({"duration_s=30", "motion.kind=walking"});
-  // The picture follows the smoothed course: slow rotation stays.
-  std::vector<CameraRotation> rotations = TrueRotations(stabilised);
-  std::vector<Eigen::Vector3d> rates;
-  for (const CameraRotation& rotation : rotations) rates.push_back(Log(rotation.q_a_b));
-  for (size_t i = 0; i < rotations.size(); ++i) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    const size_t from = i < 30 ? 0 : i - 30, to = std::min(rates.size(), i + 31);
-    for (size_t k = from; k < to; ++k) sum += rates[k];
-    rotations[i].q_a_b = Exp(Eigen::Vector3d(sum / static_cast<double>(to - from)));
-  }
-  const auto found = FindElectronicStabilisation(stabilised.recording, rotations);
-  ASSERT_TRUE(found);
-  EXPECT_THAT(*found, HasSubstr("above 1 Hz"));
-}
-
-// As the program finds them: from the tracks, 0.1 s apart.
-TEST(DataFaults, ElectronicStabilisationInTheRotationsThatTheStartUses) {
-  const std::string stabiliser = "effects.electronic_stabilisation={strength: 1, smoothing_s: 0.5}";
-  for (const bool stabilised : {false, true}) {
-    std::vector<std::string> overrides = {"duration_s=20", "motion.kind=walking"};
-    if (stabilised) overrides.push_back(stabiliser);
-    const auto s = Simulate(overrides);
-    const std::vector<CameraRotation> rotations =
-        CameraRotationsOf(s.recording, PairsForRotations(s.recording), {{s.truth.lens[kFocal], {}}})
-            .front();
-    EXPECT_EQ(FindElectronicStabilisation(s.recording, rotations).has_value(), stabilised);
-  }
 }
 
 }  // namespace
