@@ -9,6 +9,7 @@
 #include "core/known_camera.h"
 #include "core/lens.h"
 #include "core/parallel.h"
+#include "core/robust_statistics.h"
 #include "core/time.h"
 #include "frontend/gyro_rotation.h"
 #include "frontend/two_view_rotation.h"
@@ -17,7 +18,8 @@ namespace camgyro {
 namespace {
 
 constexpr double kPairS = 0.1;
-constexpr size_t kMinPairs = 30;  // the start asks for 20
+constexpr size_t kMinPairs = 30;   // the start asks for 20
+constexpr size_t kFewMatches = 8;  // fewer tell no rotation (CheckImageMotion)
 
 // A motion is followed from one focal length to the next if these are no further apart (log).
 // Where no gyro says which minimum is the right one, it is searched anew at every fifth: a wrong
@@ -70,6 +72,16 @@ class LensAtRest {
   const double usual_readout_s_;
 };
 
+// Matches of frames so far apart: the median of some of them.
+size_t UsualMatches(const std::vector<std::vector<TrackedPoint>>& tracks, size_t gap) {
+  constexpr size_t kPairs = 100;
+  std::vector<size_t> counts;
+  for (const size_t a : SpreadIndices(tracks.size() > gap ? tracks.size() - gap : 0, kPairs)) {
+    counts.push_back(CountMatches(tracks[a], tracks[a + gap]));
+  }
+  return counts.empty() ? 0 : MedianInPlace(&counts);
+}
+
 }  // namespace
 
 std::vector<FramePair> PairsForRotations(const Recording& recording, size_t max_pairs) {
@@ -84,8 +96,9 @@ std::vector<FramePair> PairsForRotations(const Recording& recording, size_t max_
   if (!(interval_s > 0.0)) return {};
   const size_t frames = recording.tracks.size();
   const size_t longest = std::max<size_t>(1, frames / kMinPairs);
-  const size_t gap =
+  size_t gap =
       std::clamp(static_cast<size_t>(std::lround(kPairS / interval_s)), size_t{1}, longest);
+  while (gap > 1 && UsualMatches(recording.tracks, gap) < kFewMatches) --gap;  // short-lived tracks
   for (const size_t i : SpreadIndices(frames > gap ? (frames - 1) / gap : 0, max_pairs)) {
     const size_t a = i * gap, b = a + gap;
     pairs.push_back({static_cast<int>(a), static_cast<int>(b),

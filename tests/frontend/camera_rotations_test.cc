@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/robust_statistics.h"
 #include "core/so3.h"
 #include "frontend/gyro_rotation.h"
 #include "simulation/simulate.h"
@@ -93,6 +94,27 @@ TEST(PairsForRotations, AreChosenBeforeTheirMatchesAreMade) {
   recording.matches.resize(50);
   EXPECT_EQ(PairsForRotations(recording).size(), 50u);
   EXPECT_EQ(PairsForRotations(recording, 10)[3].frame_a, all[15].frame_a);
+}
+
+// Of a tracker that loses its points within 0.1 s.
+TEST(PairsForRotations, AreCloserWhereTracksAreShort) {
+  simulation::Scenario scenario;
+  scenario.duration_s = 4.0;
+  Recording recording = simulation::SimulateTracks(scenario).value().recording;
+  const size_t usual = PairsForRotations(recording).size();
+  for (size_t i = 0; i < recording.tracks.size(); ++i) {
+    for (TrackedPoint& point : recording.tracks[i]) {
+      point.track_id = 1000 * point.track_id + static_cast<int64_t>(i / 3);
+    }
+  }
+  const std::vector<FramePair> pairs = PairsForRotations(recording);
+  EXPECT_GT(pairs.size(), usual);
+  std::vector<size_t> counts;
+  for (const FramePair& pair : pairs) {
+    EXPECT_EQ(pair.frame_b, pair.frame_a + 1);
+    counts.push_back(pair.matches.size());
+  }
+  EXPECT_GE(MedianInPlace(&counts), 30u);
 }
 
 TEST(CameraRotationsOf, LeavesOutPairsThatHaveNone) {
