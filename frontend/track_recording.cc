@@ -14,6 +14,7 @@
 #include "core/robust_statistics.h"
 #include "frontend/frame_source.h"
 #include "frontend/gyro_rotation.h"
+#include "frontend/readers/recording_checks.h"
 #include "frontend/track_cleaner.h"
 
 namespace camgyro {
@@ -209,6 +210,21 @@ Status CheckImageMotion(const Recording& recording) {
       "too few features: a median of " + std::to_string(static_cast<int>(motion.matches)) +
       " matches per pair of frames, at least " + std::to_string(static_cast<int>(kMinMatches)) +
       " are needed (no texture, blur, or frames too far apart?)");
+}
+
+void LeaveOutUntrackedFrames(Recording* recording) {
+  constexpr size_t kLeast = 3;  // one in so many
+  const size_t all = recording->tracks.size();
+  std::vector<int> without;
+  for (size_t i = 0; i < all; ++i) {
+    if (recording->tracks[i].empty()) without.push_back(static_cast<int>(i));
+  }
+  if (kLeast * without.size() < all || without.size() == all) return;
+  LeaveOutFrames(without, /*repeats=*/false, recording);
+  AddFault("frames_without_points", static_cast<int>(without.size()),
+           Format("%zu of %zu frames have no points in the given tracks; they are left out",
+                  without.size(), all),
+           recording);
 }
 
 Result<TrackingSummary> TrackRecording(const TrackerOptions& options,

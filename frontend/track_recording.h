@@ -27,6 +27,10 @@ ImageMotion MeasureImageMotion(const Recording& recording);
 // kCannotEstimate if there are too few matches per pair for any estimate, or nothing moves.
 Status CheckImageMotion(const Recording& recording);
 
+// A tracker may have worked on some of the frames only, as on every other one: where a third of the
+// frames or more have no point in given tracks, those are left out, and counted as a fault.
+void LeaveOutUntrackedFrames(Recording* recording);
+
 // A picture of a lens cap, of the dark, of nothing but light: no corner in it is one of the scene.
 // `gray`: 8-bit, one channel.
 bool ShowsNothing(const cv::Mat& gray);

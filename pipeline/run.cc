@@ -17,6 +17,7 @@ Result<TrackingSummary> EnsureImageMotion(const Progress& progress, Recording* r
   if (recording->HasOnlyAttitudes()) return TrackingSummary{};
   Result<TrackingSummary> summary = TrackingSummary{};
   const bool tracked_elsewhere = !recording->tracks.empty();
+  if (tracked_elsewhere) LeaveOutUntrackedFrames(recording);
   if (recording->tracks.empty() && recording->matches.empty()) {
     TrackingProgress tracking;
     if (progress) tracking = [&](double done) { progress("tracking", done); };

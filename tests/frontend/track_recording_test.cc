@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -142,6 +143,35 @@ TEST(TrackRecording, RefusesARecordingMostOfWhichHasAnotherSize) {
   EXPECT_THAT(summary.error().message,
               HasSubstr("data/3.png: frame 4 has 120 x 90 pixels, expected 240 x 180; so it is in "
                         "9 of 12 frames"));
+}
+
+// Points in every other frame, or in all but a few.
+TEST(LeaveOutUntrackedFrames, OfATrackerThatSkipsFrames) {
+  const auto with_points = [](const std::function<bool(size_t)>& has_points) {
+    Recording recording;
+    for (size_t i = 0; i < 30; ++i) {
+      recording.frames.emplace_back();
+      recording.frames.back().stamp_ns = static_cast<int64_t>(i) * kInterval;
+      recording.tracks.emplace_back();
+      if (has_points(i)) recording.tracks.back().push_back({1, {10.0, 10.0}});
+    }
+    return recording;
+  };
+  Recording every_other = with_points([](size_t i) { return i % 2 == 0; });
+  LeaveOutUntrackedFrames(&every_other);
+  ASSERT_EQ(every_other.frames.size(), 15u);
+  ASSERT_EQ(every_other.tracks.size(), 15u);
+  EXPECT_EQ(every_other.frames[3].stamp_ns, 6 * kInterval);
+  ASSERT_EQ(every_other.faults.size(), 1u);
+  EXPECT_EQ(every_other.faults[0].name, "frames_without_points");
+  EXPECT_EQ(every_other.faults[0].count, 15);
+  Recording lost_for_a_while = with_points([](size_t i) { return i < 10 || i > 15; });
+  LeaveOutUntrackedFrames(&lost_for_a_while);
+  EXPECT_EQ(lost_for_a_while.frames.size(), 30u);
+  EXPECT_TRUE(lost_for_a_while.faults.empty());
+  Recording none = with_points([](size_t) { return false; });
+  LeaveOutUntrackedFrames(&none);
+  EXPECT_EQ(none.frames.size(), 30u);
 }
 
 }  // namespace

@@ -134,5 +134,19 @@ TEST(GyroCollector, RefusesTwoStreamsInOneFile) {
   EXPECT_THAT(status.error().message, HasSubstr("every other sample is of another sensor"));
 }
 
+TEST(GyroCollector, NamesAnAxisThatIsConstant) {
+  std::vector<GyroSample> samples = CleanSamples(200);
+  for (GyroSample& sample : samples) sample.omega_gyro_rad_s.y() = 0.25;
+  Recording recording;
+  ASSERT_TRUE(Collect(samples, &recording));
+  ASSERT_EQ(recording.faults.size(), 1u);
+  EXPECT_EQ(recording.faults[0].name, "gyro_axis_constant");
+  EXPECT_THAT(recording.faults[0].finding, HasSubstr("all 200 rates about y"));
+  samples[120].omega_gyro_rad_s.y() = 0.2501;
+  Recording sound;
+  ASSERT_TRUE(Collect(samples, &sound));
+  EXPECT_TRUE(sound.faults.empty());
+}
+
 }  // namespace
 }  // namespace camgyro
