@@ -126,7 +126,7 @@ std::vector<std::string> MoreRecordingYaml() {
   return {
       "gyro: {file: sensors/gyro.csv, separator: ';', time: t_us, time_unit: us,\n"
       "       columns: [wx, wy, wz], unit: deg/s}\n"
-      "camera: {images: pictures, frames: frames.csv, time: 1, time_unit: ms, image: 2}\n",
+      "camera: {images: pictures, frames: frames.csv, time: 1, time_unit: s, image: 2}\n",
       "bag: {file: a.mcap, imu_topic: /imu, image_topic: /cam/image_raw}\n"};
 }
 
