@@ -29,9 +29,10 @@ constexpr double kRepaired = 0.8;
 // Means over so long are slow motion [s].
 constexpr double kSlowS = 4.0;
 
-// By chance, slow motion that is not the gyro's explains some 0.8 kSlowS of a recording's length of
-// it (at most 1.2; 0.25 in 12 s), and that of a picture without the fast motion 0.41 to 0.59, of
-// one smoothed over 2 s 0.25: trials, walking, running and in the hand, 12 to 60 s, two seeds.
+// What of the gyro's slow motion a picture has to explain, for one without the fast motion. Slow
+// motion that is not the gyro's explains some 0.8 kSlowS / length by chance, and at most 1.2, or
+// 0.25 of 12 s; a stabilised picture 0.41 to 0.59, and one smoothed over 2 s 0.25. (Trials without
+// a commit: walking, running and in the hand, 12 to 60 s, two seeds.)
 double LeastSlowlyExplained(double length_s) {
   return std::min(1.0 / 3.0, 1.5 * kSlowS / length_s);
 }

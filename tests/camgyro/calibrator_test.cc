@@ -255,8 +255,8 @@ TEST(Calibrator, WhatNobodyDeclaredIsNotReadyAndDoubted) {
 // A lens that leads fits astray is taken in at the start, and in the total.
 TEST(Calibrator, TakesInALensThatNobodyDeclared) {
   Scenario scenario = RoomThroughALens();
-  scenario.seed =
-      2;  // with others, equidistant coefficients fit as well, whose first one is another
+  // With others, equidistant coefficients fit as well, whose first one is another.
+  scenario.seed = 2;
   const Simulated s = simulation::SimulateTracks(scenario).value();
   const auto calibrator = Make(OptionsFor(scenario));
   Feed(calibrator.get(), s.recording);
