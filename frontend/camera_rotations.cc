@@ -72,14 +72,18 @@ class LensAtRest {
   const double usual_readout_s_;
 };
 
-// Matches of frames so far apart: the median of some of them.
-size_t UsualMatches(const std::vector<std::vector<TrackedPoint>>& tracks, size_t gap) {
+// The usual gap between frames, or the longest shorter one at which some have matches enough:
+// tracks may be short-lived.
+size_t GapWithMatches(const std::vector<std::vector<TrackedPoint>>& tracks, size_t usual) {
   constexpr size_t kPairs = 100;
-  std::vector<size_t> counts;
-  for (const size_t a : SpreadIndices(tracks.size() > gap ? tracks.size() - gap : 0, kPairs)) {
-    counts.push_back(CountMatches(tracks[a], tracks[a + gap]));
+  for (size_t gap = usual; gap > 0; --gap) {
+    std::vector<size_t> counts;
+    for (const size_t a : SpreadIndices(tracks.size() > gap ? tracks.size() - gap : 0, kPairs)) {
+      counts.push_back(CountMatches(tracks[a], tracks[a + gap]));
+    }
+    if (!counts.empty() && MedianInPlace(&counts) >= kFewMatches) return gap;
   }
-  return counts.empty() ? 0 : MedianInPlace(&counts);
+  return usual;
 }
 
 }  // namespace
@@ -96,9 +100,9 @@ std::vector<FramePair> PairsForRotations(const Recording& recording, size_t max_
   if (!(interval_s > 0.0)) return {};
   const size_t frames = recording.tracks.size();
   const size_t longest = std::max<size_t>(1, frames / kMinPairs);
-  size_t gap =
-      std::clamp(static_cast<size_t>(std::lround(kPairS / interval_s)), size_t{1}, longest);
-  while (gap > 1 && UsualMatches(recording.tracks, gap) < kFewMatches) --gap;  // short-lived tracks
+  const size_t gap = GapWithMatches(
+      recording.tracks,
+      std::clamp(static_cast<size_t>(std::lround(kPairS / interval_s)), size_t{1}, longest));
   for (const size_t i : SpreadIndices(frames > gap ? (frames - 1) / gap : 0, max_pairs)) {
     const size_t a = i * gap, b = a + gap;
     pairs.push_back({static_cast<int>(a), static_cast<int>(b),
