@@ -253,6 +253,7 @@ std::optional<DataFault> RepairRecording(const CameraRotationsAt& rotations_at,
   if (!best) return std::nullopt;
   recording->camera.q_gyro_cam.reset();
   best->apply(recording);
+  recording->faults.push_back({best->name, 1, best->finding + "; repaired for this run"});
   return DataFault{best->name, best->finding, best->advice};
 }
 

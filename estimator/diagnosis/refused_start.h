@@ -16,7 +16,8 @@ namespace camgyro {
 // Does the recording fit with the gyro in another unit (deg/s), with one of its axes mirrored (a
 // wrong order of axes is a mirror, too), with accelerometer and gyro exchanged, or with the stamps
 // of one of both slowed down or sped up, as those of a slow motion are that is stamped as it is
-// played? Repairs the recording and says what it was; without an answer it stays as it is.
+// played? Repairs the recording, records the fault, and says what it was; without an answer it
+// stays as it is.
 std::optional<DataFault> RepairRecording(const CameraRotationsAt& rotations_at,
                                          const StartOptions& options, Recording* recording);
 

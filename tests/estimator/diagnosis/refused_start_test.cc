@@ -122,6 +122,9 @@ TEST(RefusedStart, FindsTheClockThatIsWrong) {
       const auto fault = RepairRecording(TrueRotationsOf(s), {}, &slow);
       ASSERT_TRUE(fault);
       EXPECT_EQ(fault->name, "frame_clock");
+      ASSERT_EQ(slow.faults.size(), 1u);  // what calibration.yaml has of it
+      EXPECT_EQ(slow.faults[0].name, "frame_clock");
+      EXPECT_THAT(slow.faults[0].finding, HasSubstr("repaired for this run"));
       EXPECT_NEAR(
           SecondsSince(slow.frames.front().stamp_ns, slow.frames.back().stamp_ns),
           SecondsSince(s.recording.frames.front().stamp_ns, s.recording.frames.back().stamp_ns),
