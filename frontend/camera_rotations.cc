@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kPairS = 0.1;
 constexpr size_t kMinPairs = 30;   // the start asks for 20
-constexpr size_t kFewMatches = 8;  // fewer tell no rotation (CheckImageMotion)
+constexpr size_t kFewMatches = 8;  // as CheckImageMotion asks of pairs
 
 // A motion is followed from one focal length to the next if these are no further apart (log).
 // Where no gyro says which minimum is the right one, it is searched anew at every fifth: a wrong

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/constant_axes.h"
 #include "core/effects/catalogue.h"
 #include "core/format.h"
 #include "core/gyro_gap.h"
@@ -117,6 +118,14 @@ std::vector<DataFault> FindDataFaults(const Recording& recording) {
                       Format("%ld of %zu gyro samples stay at the rail of %.3f rad/s (%.0f deg/s)",
                              static_cast<long>(count), saturated.size(), rail, rail * 57.29578),
                       FindEffect("gyro_saturation")->advice, static_cast<int>(count)});
+  }
+  if (const std::string constant = ConstantAxes(recording.gyro); !constant.empty()) {
+    faults.push_back(
+        {"gyro_axis_constant",
+         Format("all %zu rates about %s have the same value", recording.gyro.size(),
+                constant.c_str()),
+         "find out why that axis measures nothing; what depends on it is not determined",
+         static_cast<int>(constant.size())});
   }
   const Gaps frames = FindGaps(recording.frames, origin_ns, [&](size_t i) {
     return recording.PictureOf(i) > recording.PictureOf(i - 1) + 1;  // left out

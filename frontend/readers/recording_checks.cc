@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/constant_axes.h"
 #include "core/robust_statistics.h"
 #include "core/time.h"
 #include "frontend/readers/text.h"
@@ -32,30 +33,6 @@ bool SamplesTakeTurns(const std::vector<GyroSample>& samples) {
     return MedianInPlace(&changes);
   };
   return median_change(1) > kRatio * median_change(2);
-}
-
-// One that measures nothing, or that a logger forgot.
-void NoteConstantAxis(const std::string& file, Recording* recording) {
-  constexpr size_t kFewest = 100;  // samples: fewer may be of a device at rest
-  const std::vector<GyroSample>& gyro = recording->gyro;
-  if (gyro.size() < kFewest) return;
-  std::string constant;
-  int count = 0;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const double value = gyro.front().omega_gyro_rad_s[axis];
-    if (std::any_of(gyro.begin(), gyro.end(), [&](const GyroSample& sample) {
-          return sample.omega_gyro_rad_s[axis] != value;
-        })) {
-      continue;
-    }
-    constant += Concat(count == 0 ? "" : " and ", "xyz"[axis]);
-    ++count;
-  }
-  if (count == 0 || count == 3) return;
-  AddFault("gyro_axis_constant", count,
-           Concat(file, ": all ", gyro.size(), " rates about ", constant,
-                  " have the same value: an axis that measures nothing?"),
-           recording);
 }
 
 }  // namespace
@@ -199,7 +176,10 @@ Status GyroCollector::Finish(const std::string& file) {
                            " ns, too short for any gyro; expected stamps in nanoseconds"));
   }
   if (Status unit = CheckRateUnit(file, gyro); !unit) return unit;
-  NoteConstantAxis(file, recording_);
+  if (const std::string constant = ConstantAxes(gyro); !constant.empty()) {
+    recording_->notes.push_back(Concat(file, ": all ", gyro.size(), " rates about ", constant,
+                                       " have the same value: an axis that measures nothing?"));
+  }
   if (repeated_ > 0) {
     AddFault("samples_repeat", repeated_,
              Concat(file, ": ", repeated_, " rows that repeat the one before were dropped"),

@@ -39,6 +39,15 @@ TEST(DataFaults, Saturation) {
   EXPECT_EQ(marked, clipped);
 }
 
+TEST(DataFaults, AnAxisThatIsConstant) {
+  Recording recording = SimulateFor12S({"motion.kind=walking"}).recording;
+  for (GyroSample& sample : recording.gyro) sample.omega_gyro_rad_s.y() = 0.25;
+  const std::vector<DataFault> faults = FindDataFaults(recording);
+  ASSERT_THAT(Names(faults), testing::ElementsAre("gyro_axis_constant"));
+  EXPECT_THAT(faults[0].finding, HasSubstr("rates about y have the same value"));
+  EXPECT_EQ(faults[0].count, 1);
+}
+
 TEST(DataFaults, DroppedFramesAndSamples) {
   Recording recording = SimulateFor12S({}).recording;
   recording.frames.erase(recording.frames.begin() + 100, recording.frames.begin() + 103);
