@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "core/format.h"
 #include "core/state.h"
 #include "estimator/astray.h"
+#include "estimator/window/gyro_noise.h"
 
 namespace camgyro {
 namespace {
@@ -17,6 +20,27 @@ constexpr double kShortestFocal = 0.15, kLongestFocal = 8.0;
 // UnseenRatio beyond which it is doubted: 0.93 to 1.14 with the right model, and 1.23 to 1.25 where
 // a lens moves as no model has it (docs/lab/random_faults.md#frames-that-the-fit-has-not-seen).
 constexpr double kUnseenRatio = 1.2;
+
+// How many times as much noise as is declared a gyro's samples show before a note says so: less
+// with a right data sheet from 100 Hz on, 5 times with the motors of a drone
+// (docs/lab/gyro_noise.md#more-than-is-declared).
+constexpr double kMoreThanDeclared = 3.0;
+
+// Empty where the samples bear out what is declared, or nothing is.
+std::string GyroNoiseNote(const Recording& recording, double delay_s) {
+  const std::optional<double>& declared = recording.gyro_info.noise_density_rad_s_rtHz;
+  const double interval_s = MedianInterval(recording.gyro);
+  if (!declared || !(interval_s > 0.0)) return "";
+  const double shown = std::sqrt(ShownGyroSigma(recording, delay_s).squaredNorm() / 3.0);
+  const double density = shown * std::sqrt(interval_s);
+  if (density < kMoreThanDeclared * *declared) return "";
+  return Format(
+      "the gyro's samples scatter like noise of up to %.2g rad/s/rtHz, and %.2g is declared: "
+      "motors that shake it, a data sheet that is wrong, or too few samples for this motion; the "
+      "sigmas of noise are those of what is declared, and without gyroscope_noise_density in "
+      "imu0/sensor.yaml of what the samples show",
+      density, *declared);
+}
 
 bool FocalRanAway(bool attitudes, const Calibration& c) {
   const double diagonal_px = std::hypot(c.width_px, c.height_px);
@@ -114,6 +138,8 @@ void AddDoubts(const Recording& recording, CalibrationReport* report) {
   if (determined(kStateReadout) && c.readout_s < -3.0 * sigma[kStateReadout]) {
     report->notes.push_back("the readout is negative: rows are read from bottom to top");
   }
+  const std::string gyro_noise = GyroNoiseNote(recording, c.delay_s);
+  if (!gyro_noise.empty()) report->notes.push_back(gyro_noise);
   const double interval = MedianInterval(recording.frames);
   if (determined(kStateReadout) && std::abs(c.readout_s) > 1.05 * interval) {
     report->doubts.push_back(

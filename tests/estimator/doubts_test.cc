@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "tests/estimator/simulated_input.h"
 
@@ -59,6 +60,28 @@ TEST(Doubts, UnseenFramesThatFitWorseBeyondTheGyrosNoise) {
   EXPECT_THAT(doubts_of(0.62, 0.0), ::testing::ElementsAre(::testing::HasSubstr("fit worse")));
   EXPECT_THAT(doubts_of(0.8, 0.1), ::testing::ElementsAre(::testing::HasSubstr("fit worse")));
   EXPECT_THAT(doubts_of(0.8, 0.7), ::testing::IsEmpty());
+}
+
+TEST(Doubts, AGyroThatShowsMoreNoiseThanIsDeclaredIsNoted) {
+  simulation::Simulated s = simulation::SimulateTracks(ShortScenario(4.0)).value();
+  std::optional<double>& declared = s.recording.gyro_info.noise_density_rad_s_rtHz;
+  ASSERT_TRUE(declared);
+  const auto notes_of = [&] {
+    CalibrationReport report;
+    report.converged = true;
+    report.calibration = s.truth;
+    AddDoubts(s.recording, &report);
+    EXPECT_THAT(report.doubts, ::testing::IsEmpty());
+    return report.notes;
+  };
+  EXPECT_THAT(notes_of(), ::testing::IsEmpty());
+  const double right = *declared;
+  declared = 10.0 * right;
+  EXPECT_THAT(notes_of(), ::testing::IsEmpty());
+  declared = 0.2 * right;
+  EXPECT_THAT(notes_of(), ::testing::ElementsAre(::testing::HasSubstr("motors that shake it")));
+  declared.reset();
+  EXPECT_THAT(notes_of(), ::testing::IsEmpty());
 }
 
 // A gimbal's camera ended with 4013 ± 2217 px and a readout of 0.4 ± 0.3 ms, which is 10 or more;
